@@ -1,0 +1,7 @@
+//! stub
+/// stub
+#[derive(Debug)]
+pub enum Resolve {
+    /// s
+    Blend,
+}

@@ -1,0 +1,45 @@
+//! The figures of a frame.
+
+use crate::Technique;
+
+/// One timed part of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// What was done.
+    pub name: &'static str,
+    /// Wall-clock milliseconds.
+    pub ms: f64,
+}
+
+/// What a frame took and held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stats {
+    /// How fragments were captured and ordered.
+    pub technique: Technique,
+    /// The device that did it, in words.
+    pub device: String,
+    /// Width of the picture in pixels.
+    pub width: u32,
+    /// Height of the picture in pixels.
+    pub height: u32,
+    /// Triangles after instancing.
+    pub triangles: u64,
+    /// Triangles left out because a vertex is NaN, infinite or beyond the range of f32 after projection.
+    pub dropped_triangles: u64,
+    /// Transparent fragments captured.
+    pub fragments: u64,
+    /// Most fragments at one pixel.
+    pub max_depth_complexity: u32,
+    /// Fragments over pixels that have any.
+    pub mean_depth_complexity: f64,
+    /// Timed parts, in order.
+    pub steps: Vec<Step>,
+    /// Whole frame, without loading, in milliseconds.
+    pub total_ms: f64,
+    /// Most bytes held at once besides scene and picture.
+    pub peak_bytes: u64,
+    /// Parts of the screen the capture was split into to stay inside its budget; 1 for all at once.
+    pub windows: u32,
+    /// Captures repeated because an estimate of their size was too small.
+    pub rerenders: u32,
+}

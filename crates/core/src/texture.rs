@@ -1,0 +1,346 @@
+//! Textures: 8-bit sRGB colour with straight alpha, mip-mapped, filtered in linear light.
+//!
+//! A level is chosen from analytic derivatives of the texture coordinates (OpenGL 4.6 specification, section 8.14), and
+//! levels are made by an exact box filter in linear light, weighted by alpha, so that colours under transparent texels
+//! do not bleed.
+
+use std::sync::LazyLock;
+
+use glam::{Vec2, Vec4};
+
+use crate::Error;
+use crate::color::{linear_from_srgb8, srgb8_from_linear, unorm8};
+
+/// Largest width or height of a texture, in texels.
+pub const MAX_TEXTURE_SIZE_PX: u32 = 16_384;
+
+/// What lies beyond the edge of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Wrap {
+    /// The texture again.
+    #[default]
+    Repeat,
+    /// The texture mirrored.
+    MirroredRepeat,
+    /// The edge texel.
+    ClampToEdge,
+}
+
+/// How texels become a colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Filter {
+    /// The one texel the coordinate lies in.
+    Nearest,
+    /// Four texels weighted by distance.
+    #[default]
+    Linear,
+}
+
+/// How a texture is sampled (glTF 2.0, section 5.26).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Sampler {
+    /// Beyond left and right edge.
+    pub wrap_u: Wrap,
+    /// Beyond top and bottom edge.
+    pub wrap_v: Wrap,
+    /// Where a texel covers more than a pixel.
+    pub magnify: Filter,
+    /// Where a pixel covers more than a texel, within a mip level.
+    pub minify: Filter,
+    /// Between mip levels; `None`: the full-size level only.
+    pub mip: Option<Filter>,
+}
+
+impl Default for Sampler {
+    /// Repeating, linear everywhere.
+    fn default() -> Self {
+        Self {
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            magnify: Filter::Linear,
+            minify: Filter::Linear,
+            mip: Some(Filter::Linear),
+        }
+    }
+}
+
+/// One mip level: RGBA, 8 bits a channel, sRGB-encoded colour, straight alpha.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MipLevel {
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// `width * height` texels, row by row from the top.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// A texture with all its mip levels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Texture {
+    levels: Vec<MipLevel>,
+    sampler: Sampler,
+}
+
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb8(i as u8)));
+static UNORM: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
+
+fn decode([r, g, b, a]: [u8; 4]) -> Vec4 {
+    let linear = &*LINEAR;
+    Vec4::new(linear[r as usize], linear[g as usize], linear[b as usize], UNORM[a as usize])
+}
+
+impl Texture {
+    /// A texture from `width * height` RGBA texels, sRGB-encoded colour and straight alpha, rows from the top. Mip
+    /// levels are made if the sampler uses them.
+    ///
+    /// # Errors
+    /// [`Error::Texture`] if a side is 0 or above [`MAX_TEXTURE_SIZE_PX`], or the data do not fit the size.
+    pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>, sampler: Sampler) -> Result<Self, Error> {
+        let sides = 1..=MAX_TEXTURE_SIZE_PX;
+        if !sides.contains(&width) || !sides.contains(&height) {
+            return Err(Error::Texture(format!(
+                "{width} x {height} texels; a side must lie between 1 and {MAX_TEXTURE_SIZE_PX}"
+            )));
+        }
+        if texels.len() != width as usize * height as usize {
+            return Err(Error::Texture(format!("{} texels for {width} x {height}", texels.len())));
+        }
+        let mut levels = vec![MipLevel { width, height, texels }];
+        if sampler.mip.is_some() {
+            while let Some(smaller) = half(&levels[levels.len() - 1]) {
+                levels.push(smaller);
+            }
+        }
+        Ok(Self { levels, sampler })
+    }
+
+    /// All levels, the full size first.
+    pub fn levels(&self) -> &[MipLevel] {
+        &self.levels
+    }
+
+    /// How it is sampled.
+    pub fn sampler(&self) -> Sampler {
+        self.sampler
+    }
+
+    /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
+    /// changes by `duv_dx` to the right and `duv_dy` downwards.
+    pub fn sample(&self, uv: Vec2, duv_dx: Vec2, duv_dy: Vec2) -> Vec4 {
+        // Far beyond this, neighbouring texels share one f32 coordinate; NaN becomes 0.
+        let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
+        let base = &self.levels[0];
+        let size = Vec2::new(base.width as f32, base.height as f32);
+        let (dx, dy) = (duv_dx * size, duv_dy * size);
+        let texels_squared = dx.length_squared().max(dy.length_squared());
+        // Not `<=`: NaN derivatives count as magnified.
+        if !(texels_squared > 1.0) {
+            return self.sample_level(0, self.sampler.magnify, uv);
+        }
+        let Some(mip_filter) = self.sampler.mip else {
+            return self.sample_level(0, self.sampler.minify, uv);
+        };
+        let last = self.levels.len() - 1;
+        let level = (0.5 * log2(texels_squared)).min(last as f32);
+        match mip_filter {
+            Filter::Nearest => self.sample_level((level + 0.5) as usize, self.sampler.minify, uv),
+            Filter::Linear => {
+                let (whole, fraction) = (level as usize, level.fract());
+                let near = self.sample_level(whole, self.sampler.minify, uv);
+                if fraction == 0.0 {
+                    return near;
+                }
+                near + (self.sample_level((whole + 1).min(last), self.sampler.minify, uv) - near) * fraction
+            }
+        }
+    }
+
+    fn sample_level(&self, level: usize, filter: Filter, uv: Vec2) -> Vec4 {
+        let level = &self.levels[level];
+        let u = wrap_unit(uv.x, self.sampler.wrap_u) * level.width as f32;
+        let v = wrap_unit(uv.y, self.sampler.wrap_v) * level.height as f32;
+        match filter {
+            Filter::Nearest => decode(self.texel(level, u.floor() as i32, v.floor() as i32)),
+            Filter::Linear => {
+                let (u, v) = (u - 0.5, v - 0.5);
+                let (x, y) = (u.floor(), v.floor());
+                let (fx, fy) = (u - x, v - y);
+                let (x, y) = (x as i32, y as i32);
+                let at = |dx, dy| decode(self.texel(level, x + dx, y + dy));
+                let (top_left, bottom_left) = (at(0, 0), at(0, 1));
+                let top = top_left + (at(1, 0) - top_left) * fx;
+                let bottom = bottom_left + (at(1, 1) - bottom_left) * fx;
+                top + (bottom - top) * fy
+            }
+        }
+    }
+
+    fn texel(&self, level: &MipLevel, x: i32, y: i32) -> [u8; 4] {
+        let x = wrap_texel(x, level.width, self.sampler.wrap_u);
+        let y = wrap_texel(y, level.height, self.sampler.wrap_v);
+        level.texels[y * level.width as usize + x]
+    }
+}
+
+/// Base-2 logarithm of a number above 0, exact at powers of two and linear between them: the same bits on every machine
+/// and in every shader, and near enough for a choice of mip level (at most 0.09 off).
+pub fn log2(value: f32) -> f32 {
+    let bits = value.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
+    exponent as f32 + (mantissa - 1.0)
+}
+
+/// Brings a coordinate near 0..=1, so that it can be scaled to texels: whole repeats removed, mirrored halves unfolded
+/// later by [`wrap_texel`].
+fn wrap_unit(t: f32, wrap: Wrap) -> f32 {
+    match wrap {
+        Wrap::Repeat => t - t.floor(),
+        Wrap::MirroredRepeat => t - 2.0 * (t * 0.5).floor(),
+        Wrap::ClampToEdge => t.clamp(0.0, 1.0),
+    }
+}
+
+/// The texel that stands at position `i`, which may lie outside the level by up to one repeat.
+fn wrap_texel(i: i32, size: u32, wrap: Wrap) -> usize {
+    let size = size as i32;
+    let i = match wrap {
+        Wrap::Repeat => i.rem_euclid(size),
+        Wrap::MirroredRepeat => {
+            let i = i.rem_euclid(2 * size);
+            if i < size { i } else { 2 * size - 1 - i }
+        }
+        Wrap::ClampToEdge => i.clamp(0, size - 1),
+    };
+    i as usize
+}
+
+/// The next smaller level, each side half rounded down; `None` below 1 x 1.
+fn half(level: &MipLevel) -> Option<MipLevel> {
+    if level.width == 1 && level.height == 1 {
+        return None;
+    }
+    let (width, height) = ((level.width / 2).max(1), (level.height / 2).max(1));
+    let columns = box_weights(level.width, width);
+    let rows = box_weights(level.height, height);
+    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    for row in &rows {
+        for column in &columns {
+            let (mut weighted, mut plain, mut alpha) = (Vec4::ZERO, Vec4::ZERO, 0.0);
+            for &(y, weight_y) in row {
+                for &(x, weight_x) in column {
+                    let weight = weight_x * weight_y;
+                    let texel = decode(level.texels[y as usize * level.width as usize + x as usize]);
+                    plain += texel * weight;
+                    weighted += texel * (weight * texel.w);
+                    alpha += weight * texel.w;
+                }
+            }
+            let color = if alpha > 0.0 { weighted / alpha } else { plain };
+            texels.push([
+                srgb8_from_linear(color.x),
+                srgb8_from_linear(color.y),
+                srgb8_from_linear(color.z),
+                unorm8(alpha),
+            ]);
+        }
+    }
+    Some(MipLevel { width, height, texels })
+}
+
+/// For each texel of a side halved from `from` to `to`, the texels it covers and the share of each.
+fn box_weights(from: u32, to: u32) -> Vec<Vec<(u32, f32)>> {
+    let scale = f64::from(from) / f64::from(to);
+    (0..to)
+        .map(|i| {
+            let (start, end) = (f64::from(i) * scale, f64::from(i + 1) * scale);
+            (start as u32..(end.ceil() as u32).min(from))
+                .filter_map(|x| {
+                    let covered = end.min(f64::from(x + 1)) - start.max(f64::from(x));
+                    (covered > 1e-9).then_some((x, (covered / scale) as f32))
+                })
+                .collect()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checker(sampler: Sampler) -> Texture {
+        let (black, white) = ([0, 0, 0, 255], [255; 4]);
+        Texture::new(2, 2, vec![black, white, white, black], sampler).unwrap()
+    }
+
+    #[test]
+    fn mips_average_in_linear_light() {
+        let texture = checker(Sampler::default());
+        assert_eq!(texture.levels().len(), 2);
+        // Half of linear white is sRGB 188, not 128.
+        assert_eq!(texture.levels()[1].texels, [[188, 188, 188, 255]]);
+    }
+
+    #[test]
+    fn transparent_texels_do_not_bleed_into_mips() {
+        let texture = Texture::new(2, 1, vec![[200, 0, 0, 255], [0, 255, 0, 0]], Sampler::default()).unwrap();
+        assert_eq!(texture.levels()[1].texels, [[200, 0, 0, 128]]);
+    }
+
+    #[test]
+    fn odd_sides_lose_no_texel() {
+        let texels = vec![[0, 0, 0, 255], [0, 0, 0, 255], [255, 255, 255, 255]];
+        let texture = Texture::new(3, 1, texels, Sampler::default()).unwrap();
+        let third = srgb8_from_linear(1.0 / 3.0);
+        assert_eq!(texture.levels()[1].texels, [[third, third, third, 255]]);
+    }
+
+    #[test]
+    fn wraps_choose_the_texel_beyond_the_edge() {
+        for (wrap, expected) in [
+            (Wrap::Repeat, [3, 0, 1, 2, 3, 0, 1, 2, 3, 0]),
+            (Wrap::MirroredRepeat, [0, 0, 1, 2, 3, 3, 2, 1, 0, 0]),
+            (Wrap::ClampToEdge, [0, 0, 1, 2, 3, 3, 3, 3, 3, 3]),
+        ] {
+            let texels = (0..4).map(|i| [0, 0, 0, i]).collect();
+            let sampler =
+                Sampler { wrap_u: wrap, wrap_v: wrap, magnify: Filter::Nearest, minify: Filter::Nearest, mip: None };
+            let texture = Texture::new(4, 1, texels, sampler).unwrap();
+            for (i, &alpha) in (-1..).zip(&expected) {
+                let uv = Vec2::new((i as f32 + 0.5) / 4.0, 0.5);
+                let sampled = texture.sample(uv, Vec2::ZERO, Vec2::ZERO).w * 255.0;
+                assert_eq!(sampled.round() as u8, alpha, "{wrap:?} at texel {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn minified_samples_come_from_the_level_that_fits() {
+        let texture = checker(Sampler::default());
+        let sharp = texture.sample(Vec2::splat(0.25), Vec2::ZERO, Vec2::ZERO);
+        assert_eq!(sharp.x, 0.0);
+        let far = texture.sample(Vec2::splat(0.25), Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0));
+        assert!((far.x - 0.5).abs() < 0.01, "{far}");
+    }
+
+    #[test]
+    fn absurd_coordinates_give_a_colour() {
+        for value in [f32::NAN, f32::INFINITY, 1e38, -1e38, f32::MIN_POSITIVE] {
+            for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge] {
+                let texture = checker(Sampler { wrap_u: wrap, wrap_v: wrap, ..Sampler::default() });
+                for derivative in [0.0, 1.0, value] {
+                    let color = texture.sample(Vec2::new(value, -value), Vec2::splat(derivative), Vec2::ZERO);
+                    assert!(color.is_finite(), "{value} {derivative}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_that_do_not_fit_are_refused() {
+        assert!(Texture::new(0, 1, vec![], Sampler::default()).is_err());
+        assert!(Texture::new(2, 2, vec![[0; 4]; 3], Sampler::default()).is_err());
+        assert!(Texture::new(MAX_TEXTURE_SIZE_PX + 1, 1, vec![], Sampler::default()).is_err());
+    }
+}
