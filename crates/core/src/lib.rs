@@ -36,7 +36,7 @@ pub use image::Image;
 pub use layers::Layers;
 pub use resolve::Resolve;
 pub use scene::{AlphaMode, Instance, Material, MaterialId, Mesh, MeshId, Scene, TextureId};
-pub use stats::Stats;
+pub use stats::{Frame, Stats};
 pub use technique::Technique;
 pub use texture::Texture;
 pub use view::{Shading, View};

@@ -1,6 +1,6 @@
 //! The figures of a frame.
 
-use crate::Technique;
+use crate::{Image, Technique};
 
 /// One timed part of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,4 +42,35 @@ pub struct Stats {
     pub windows: u32,
     /// Captures repeated because an estimate of their size was too small.
     pub rerenders: u32,
+}
+
+impl Stats {
+    /// Figures of a frame that is about to be rendered: everything but the size is still 0.
+    pub fn new(technique: Technique, device: String, width: u32, height: u32) -> Self {
+        Self {
+            technique,
+            device,
+            width,
+            height,
+            triangles: 0,
+            dropped_triangles: 0,
+            fragments: 0,
+            max_depth_complexity: 0,
+            mean_depth_complexity: 0.0,
+            steps: Vec::new(),
+            total_ms: 0.0,
+            peak_bytes: 0,
+            windows: 1,
+            rerenders: 0,
+        }
+    }
+}
+
+/// A rendered picture and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// The picture.
+    pub image: Image,
+    /// What it took.
+    pub stats: Stats,
 }

@@ -134,8 +134,7 @@ impl Texture {
         let size = Vec2::new(base.width as f32, base.height as f32);
         let (dx, dy) = (duv_dx * size, duv_dy * size);
         let texels_squared = dx.length_squared().max(dy.length_squared());
-        // Not `<=`: NaN derivatives count as magnified.
-        if !(texels_squared > 1.0) {
+        if texels_squared <= 1.0 || texels_squared.is_nan() {
             return self.sample_level(0, self.sampler.magnify, uv);
         }
         let Some(mip_filter) = self.sampler.mip else {

@@ -1,0 +1,33 @@
+//! What can go wrong between a scene's name and its picture on disk.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Any error of the library.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A scene could not be loaded.
+    #[error(transparent)]
+    Load(#[from] pellucid_scene::LoadError),
+    /// A scene, view or option has no meaning.
+    #[error(transparent)]
+    Core(#[from] pellucid_core::Error),
+    /// A picture could not be written; nothing was left behind.
+    #[error("cannot write '{}': {detail}", path.display())]
+    Save {
+        /// Where it should have gone.
+        path: PathBuf,
+        /// Why it did not.
+        detail: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn save(path: &std::path::Path, detail: impl ToString) -> Self {
+        Self::Save { path: path.to_owned(), detail: detail.to_string() }
+    }
+
+    pub(crate) fn save_io(path: &std::path::Path) -> impl FnOnce(io::Error) -> Self {
+        move |error| Self::save(path, error)
+    }
+}
