@@ -20,6 +20,14 @@ pub enum Error {
     /// A size, opacity or other setting of the view out of range.
     #[error("invalid view: {0}")]
     View(String),
+    /// Threads that cannot be had.
+    #[error("cannot start {threads} threads: {detail}; ask for fewer")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system says.
+        detail: String,
+    },
     /// A name that nothing has.
     #[error("unknown {kind} '{name}'; known are: {known}")]
     UnknownName {

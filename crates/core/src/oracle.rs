@@ -95,7 +95,7 @@ fn rasterize(
             if !piece.triangle.covers(x, y) {
                 continue;
             }
-            if let Some(color) = surface.color(x, y) {
+            if let Some(color) = surface.color(draw, x, y) {
                 let depth = depth_at(&depth_plane, piece.triangle.depth_range(), x - anchor_x, y - anchor_y);
                 buffer[pixel].push(Fragment { color, depth, primitive: draw.first_primitive + triangle as u32 });
             }

@@ -23,8 +23,7 @@ pub fn light(normal: Vec3) -> f32 {
 
 /// A piece of a primitive, ready to be shaded at any pixel. Attributes at corners are divided by w: affine on the screen.
 #[derive(Debug, Clone)]
-pub struct Surface<'a> {
-    draw: &'a Draw<'a>,
+pub struct Surface {
     anchor_px: [i32; 2],
     weights: [Plane; 2],
     inv_w: [f32; 3],
@@ -44,9 +43,9 @@ enum SurfaceLight {
     Normals([Vec3; 3]),
 }
 
-impl<'a> Surface<'a> {
-    /// A piece of one triangle of the mesh.
-    pub fn new(draw: &'a Draw<'a>, triangle: usize, piece: &Piece) -> Self {
+impl Surface {
+    /// A piece of one triangle of a draw's mesh.
+    pub fn new(draw: &Draw<'_>, triangle: usize, piece: &Piece) -> Self {
         let vertices = draw.mesh.triangles()[triangle].map(|vertex| vertex as usize);
         let inv_w = piece.triangle.vertices.map(|vertex| vertex.inv_w);
         let vertex_colors = draw.mesh.colors().map(|colors| {
@@ -72,37 +71,31 @@ impl<'a> Surface<'a> {
                 SurfaceLight::Normals([a * inv_w[0], b * inv_w[1], c * inv_w[2]])
             }
         };
-        Self {
-            draw,
-            anchor_px: piece.triangle.anchor_px(),
-            weights: piece.triangle.weight_planes(),
-            inv_w,
-            color,
-            light,
-        }
+        Self { anchor_px: piece.triangle.anchor_px(), weights: piece.triangle.weight_planes(), inv_w, color, light }
     }
 
-    /// The colour at a pixel, linear light and premultiplied alpha; `None` where the alpha test fails.
-    pub fn color(&self, x_px: i32, y_px: i32) -> Option<Vec4> {
+    /// The colour at a pixel, linear light and premultiplied alpha; `None` where the alpha test fails. `draw` is the one
+    /// the surface was made of.
+    pub fn color(&self, draw: &Draw<'_>, x_px: i32, y_px: i32) -> Option<Vec4> {
         let weights = self.weights_at(x_px, y_px);
         let base = match &self.color {
             SurfaceColor::Constant(color) => *color,
             SurfaceColor::Varying { vertex_colors, tex_coords } => {
                 let w = 1.0 / interpolate(self.inv_w, weights);
-                let mut color = self.draw.material.base_color;
+                let mut color = draw.material.base_color;
                 if let Some(vertex_colors) = vertex_colors {
                     color *= interpolate(*vertex_colors, weights) * w;
                 }
                 if let Some(tex_coords) = tex_coords {
-                    color *= self.texture_color(*tex_coords, weights, w);
+                    color *= self.texture_color(draw, *tex_coords, weights, w);
                 }
                 color
             }
         };
-        if self.draw.cutoff.is_some_and(|cutoff| base.w < cutoff) {
+        if draw.cutoff.is_some_and(|cutoff| base.w < cutoff) {
             return None;
         }
-        let alpha = if self.draw.blends { base.w.clamp(0.0, 1.0) * self.draw.opacity } else { self.draw.opacity };
+        let alpha = if draw.blends { base.w.clamp(0.0, 1.0) * draw.opacity } else { draw.opacity };
         let light = match &self.light {
             SurfaceLight::Constant(light) => *light,
             SurfaceLight::Normals(normals) => light(interpolate(*normals, weights)),
@@ -118,8 +111,8 @@ impl<'a> Surface<'a> {
         [1.0 - second - third, second, third]
     }
 
-    fn texture_color(&self, tex_coords: [Vec2; 3], weights: [f32; 3], w: f32) -> Vec4 {
-        let Some((texture, _)) = self.draw.texture else { return Vec4::ONE };
+    fn texture_color(&self, draw: &Draw<'_>, tex_coords: [Vec2; 3], weights: [f32; 3], w: f32) -> Vec4 {
+        let Some((texture, _)) = draw.texture else { return Vec4::ONE };
         let uv = interpolate(tex_coords, weights) * w;
         // The quotient rule on (u / w) / (1 / w).
         let derivative = |second: f64, third: f64| {

@@ -1,0 +1,165 @@
+//! Records to tiles: for each tile the records that may cover a sample in it, in draw order.
+
+use std::ops::Range;
+
+use pellucid_core::pixel_grid::{SUBPIXELS, ScreenTriangle, ScreenVertex, Viewport, center};
+
+/// Side of a tile in pixels. Small enough that the fragments of a tile with hundreds of layers stay in the second-level
+/// cache, large enough that small triangles rarely lie in two.
+pub(crate) const TILE_PX: u32 = 32;
+
+/// The tiles of a picture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileGrid {
+    viewport: Viewport,
+    /// Tiles side by side.
+    pub(crate) columns: u32,
+    /// Tiles one above another.
+    pub(crate) rows: u32,
+}
+
+/// A rectangle of pixels, all borders included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PixelRect {
+    pub(crate) left: i32,
+    pub(crate) top: i32,
+    pub(crate) right: i32,
+    pub(crate) bottom: i32,
+}
+
+impl PixelRect {
+    pub(crate) fn is_single(self) -> bool {
+        self.left == self.right && self.top == self.bottom
+    }
+}
+
+impl TileGrid {
+    pub(crate) fn new(viewport: Viewport) -> Self {
+        Self { viewport, columns: viewport.width.div_ceil(TILE_PX), rows: viewport.height.div_ceil(TILE_PX) }
+    }
+
+    pub(crate) fn tile_count(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    /// The pixels of a tile.
+    pub(crate) fn tile(&self, number: u32) -> PixelRect {
+        let (left, top) = (number % self.columns * TILE_PX, number / self.columns * TILE_PX);
+        PixelRect {
+            left: left as i32,
+            top: top as i32,
+            right: (left + TILE_PX).min(self.viewport.width) as i32 - 1,
+            bottom: (top + TILE_PX).min(self.viewport.height) as i32 - 1,
+        }
+    }
+
+    /// The pixels on screen whose centres lie in a triangle's bounding box; `None` if there are none.
+    #[inline]
+    pub(crate) fn samples_in_bounds(&self, [a, b, c]: &[ScreenVertex; 3]) -> Option<PixelRect> {
+        // The first centre at or after a coordinate, and the last one at or before it.
+        let first = |subpixels: i32| (subpixels + (SUBPIXELS / 2 - 1)) >> 8;
+        let last = |subpixels: i32| (subpixels - SUBPIXELS / 2) >> 8;
+        let rect = PixelRect {
+            left: first(a.x.min(b.x).min(c.x)).max(0),
+            top: first(a.y.min(b.y).min(c.y)).max(0),
+            right: last(a.x.max(b.x).max(c.x)).min(self.viewport.width as i32 - 1),
+            bottom: last(a.y.max(b.y).max(c.y)).min(self.viewport.height as i32 - 1),
+        };
+        (rect.left <= rect.right && rect.top <= rect.bottom).then_some(rect)
+    }
+}
+
+/// Records by tile: those of tile `i` are `records[starts[i]..starts[i + 1]]`.
+#[derive(Debug, Default)]
+pub(crate) struct Bins {
+    /// Tile and record, in draw order.
+    pairs: Vec<(u32, u32)>,
+    starts: Vec<u32>,
+    records: Vec<u32>,
+}
+
+impl Bins {
+    /// Empties the bins.
+    pub(crate) fn begin(&mut self) {
+        self.pairs.clear();
+    }
+
+    /// Adds a record with the pixels it may cover.
+    #[inline]
+    pub(crate) fn add(&mut self, record: u32, vertices: &[ScreenVertex; 3], samples: PixelRect, grid: &TileGrid) {
+        let tile = |pixel: i32| pixel as u32 / TILE_PX;
+        let (columns, rows) =
+            (tile(samples.left)..tile(samples.right) + 1, tile(samples.top)..tile(samples.bottom) + 1);
+        if columns.len() == 1 && rows.len() == 1 {
+            self.pairs.push((rows.start * grid.columns + columns.start, record));
+        } else {
+            self.add_to_tiles(record, vertices, columns, rows, grid);
+        }
+    }
+
+    /// Adds a record to those tiles of a block that do not lie wholly outside one of its edges.
+    fn add_to_tiles(
+        &mut self,
+        record: u32,
+        vertices: &[ScreenVertex; 3],
+        columns: Range<u32>,
+        rows: Range<u32>,
+        grid: &TileGrid,
+    ) {
+        let Some(triangle) = ScreenTriangle::new(*vertices) else { return };
+        for row in rows {
+            for column in columns.clone() {
+                let tile = row * grid.columns + column;
+                let rect = grid.tile(tile);
+                let reaches = triangle.edges.iter().all(|edge| {
+                    let x = if edge.a > 0 { rect.right } else { rect.left };
+                    let y = if edge.b > 0 { rect.bottom } else { rect.top };
+                    edge.biased_at(center(x), center(y)) >= 0
+                });
+                if reaches {
+                    self.pairs.push((tile, record));
+                }
+            }
+        }
+    }
+
+    /// Sorts what was added by tile, keeping draw order.
+    pub(crate) fn finish(&mut self, grid: &TileGrid) {
+        self.starts.clear();
+        self.records.clear();
+        if self.pairs.is_empty() {
+            return;
+        }
+        self.starts.resize(grid.tile_count() + 1, 0);
+        for &(tile, _) in &self.pairs {
+            self.starts[tile as usize + 1] += 1;
+        }
+        for i in 1..self.starts.len() {
+            self.starts[i] += self.starts[i - 1];
+        }
+        self.records.resize(self.pairs.len(), 0);
+        // Each start moves to the next one's place while its records are put down ...
+        for &(tile, record) in &self.pairs {
+            let place = &mut self.starts[tile as usize];
+            self.records[*place as usize] = record;
+            *place += 1;
+        }
+        // ... and back.
+        self.starts.copy_within(0..grid.tile_count(), 1);
+        self.starts[0] = 0;
+    }
+
+    /// The records of a tile, in draw order.
+    pub(crate) fn tile(&self, number: u32) -> &[u32] {
+        if self.records.is_empty() {
+            return &[];
+        }
+        let number = number as usize;
+        &self.records[self.starts[number] as usize..self.starts[number + 1] as usize]
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pairs.capacity() * size_of::<(u32, u32)>() + (self.starts.capacity() + self.records.capacity()) * 4
+    }
+}
