@@ -24,14 +24,15 @@ pub const MAX_CLIPPED_VERTICES: usize = 9;
 /// corners. Positions must be finite.
 pub fn clip_triangle(corners: [Vec4; 3], viewport: &Viewport) -> Vec<ClippedVertex> {
     let [guard_x, guard_y] = viewport.guard().map(f64::from);
-    // Inside where the dot product is not negative.
-    let planes = [
-        DVec4::new(0.0, 0.0, -1.0, 1.0),
-        DVec4::new(0.0, 0.0, 1.0, 0.0),
-        DVec4::new(1.0, 0.0, 0.0, guard_x),
-        DVec4::new(-1.0, 0.0, 0.0, guard_x),
-        DVec4::new(0.0, 1.0, 0.0, guard_y),
-        DVec4::new(0.0, -1.0, 0.0, guard_y),
+    // Inside where the dot product is not negative; and how to land exactly on the plane, however large the numbers.
+    type Land = fn(&mut DVec4, f64);
+    let planes: [(DVec4, f64, Land); 6] = [
+        (DVec4::new(0.0, 0.0, -1.0, 1.0), 0.0, land_on_near_plane),
+        (DVec4::new(0.0, 0.0, 1.0, 0.0), 0.0, |clip, _| clip.z = 0.0),
+        (DVec4::new(1.0, 0.0, 0.0, guard_x), guard_x, |clip, guard| clip.x = -guard * clip.w),
+        (DVec4::new(-1.0, 0.0, 0.0, guard_x), guard_x, |clip, guard| clip.x = guard * clip.w),
+        (DVec4::new(0.0, 1.0, 0.0, guard_y), guard_y, |clip, guard| clip.y = -guard * clip.w),
+        (DVec4::new(0.0, -1.0, 0.0, guard_y), guard_y, |clip, guard| clip.y = guard * clip.w),
     ];
     let mut polygon = Vec::with_capacity(MAX_CLIPPED_VERTICES);
     polygon.extend(
@@ -41,7 +42,12 @@ pub fn clip_triangle(corners: [Vec4; 3], viewport: &Viewport) -> Vec<ClippedVert
             .map(|(weights, clip)| ClippedVertex { clip: clip.as_dvec4(), weights }),
     );
     let mut next = Vec::with_capacity(MAX_CLIPPED_VERTICES);
-    for plane in planes {
+    for (plane, guard, land) in planes {
+        let crossing = |inside: ClippedVertex, distance_in: f64, outside: ClippedVertex, distance_out: f64| {
+            let mut vertex = crossing(inside, distance_in, outside, distance_out);
+            land(&mut vertex.clip, guard);
+            vertex
+        };
         next.clear();
         for (i, &current) in polygon.iter().enumerate() {
             let following = polygon[(i + 1) % polygon.len()];
@@ -70,4 +76,9 @@ fn crossing(inside: ClippedVertex, distance_in: f64, outside: ClippedVertex, dis
         clip: inside.clip + (outside.clip - inside.clip) * t,
         weights: inside.weights + (outside.weights - inside.weights) * t,
     }
+}
+
+/// On the near plane z equals w. A perspective camera's z is the same everywhere, and positive; an orthographic one's w.
+fn land_on_near_plane(clip: &mut DVec4, _: f64) {
+    if clip.w == 1.0 { clip.z = 1.0 } else { clip.w = clip.z }
 }

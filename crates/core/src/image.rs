@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use crate::color::{srgb8_from_linear, unorm8};
+use crate::color::{Srgb8Encoder, unorm8};
 
 /// A picture: rows from top to bottom, linear light, premultiplied alpha.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,14 +45,23 @@ impl Image {
 
     /// 8-bit RGBA as PNG wants it: sRGB-encoded colour, straight alpha, rounded to nearest.
     pub fn to_srgb8(&self) -> Vec<u8> {
-        self.pixels.iter().flat_map(|&pixel| srgb8_pixel(pixel)).collect()
+        let encoder = Srgb8Encoder::shared();
+        let mut bytes = vec![0; self.pixels.len() * 4];
+        for (bytes, &pixel) in bytes.as_chunks_mut().0.iter_mut().zip(&self.pixels) {
+            *bytes = encoded_pixel(encoder, pixel);
+        }
+        bytes
     }
 }
 
 /// One pixel, linear and premultiplied, as 8-bit sRGB with straight alpha.
 pub fn srgb8_pixel(pixel: Vec4) -> [u8; 4] {
+    encoded_pixel(Srgb8Encoder::shared(), pixel)
+}
+
+fn encoded_pixel(encoder: &Srgb8Encoder, pixel: Vec4) -> [u8; 4] {
     let alpha = pixel.w;
     let straight = if alpha > 0.0 { pixel.truncate() / alpha } else { glam::Vec3::ZERO };
-    let [r, g, b] = straight.to_array().map(srgb8_from_linear);
+    let [r, g, b] = straight.to_array().map(|channel| encoder.encode(channel));
     [r, g, b, unorm8(alpha)]
 }

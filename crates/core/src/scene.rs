@@ -6,6 +6,7 @@
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
+use crate::shading::GREATEST_COLOR;
 use crate::{Camera, Error, Texture};
 
 /// A mesh of a [`Scene`].
@@ -243,6 +244,9 @@ pub struct Scene {
     primitive_count: u32,
 }
 
+/// Coordinates beyond it do not count for a scene's bounds. Squares of sums of them are still finite.
+pub const BOUNDS_LIMIT: f32 = 1e18;
+
 /// The sphere a camera is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundingSphere {
@@ -271,8 +275,16 @@ impl Scene {
     /// Adds a material.
     ///
     /// # Errors
-    /// [`Error::Scene`] if its texture is not one of this scene.
+    /// [`Error::Scene`] if its texture is not one of this scene, or its base colour is negative, not a number or above
+    /// [`GREATEST_COLOR`].
     pub fn add_material(&mut self, material: Material) -> Result<MaterialId, Error> {
+        let color = material.base_color;
+        if !(color.cmpge(Vec4::ZERO) & color.cmple(GREATEST_COLOR)).all() {
+            return Err(Error::Scene(format!(
+                "material '{}' has the colour {color}; channels go from 0 to 65504",
+                material.name
+            )));
+        }
         if let Some(texture) = material.texture
             && texture.texture.index() >= self.textures.len()
         {
@@ -362,15 +374,16 @@ impl Scene {
         self.primitive_count
     }
 
-    /// The smallest box, as its two extreme corners in world space, around all finite vertices that a triangle uses;
-    /// `None` if there are none.
+    /// The smallest box, as its two extreme corners in world space, around all vertices that a triangle uses; `None` if
+    /// there are none. Vertices that are NaN, infinite or farther than [`BOUNDS_LIMIT`] from the origin do not count: a
+    /// camera fitted to them would see nothing else.
     pub fn bounding_box(&self) -> Option<(Vec3, Vec3)> {
         let mut bounds: Option<(Vec3, Vec3)> = None;
         for instance in &self.instances {
             let mesh = self.mesh(instance.mesh);
             for &vertex in mesh.triangles.as_flattened() {
                 let position = instance.world_from_mesh.transform_point3(mesh.positions[vertex as usize]);
-                if position.is_finite() {
+                if position.abs().cmple(Vec3::splat(BOUNDS_LIMIT)).all() {
                     let (low, high) = bounds.unwrap_or((position, position));
                     bounds = Some((low.min(position), high.max(position)));
                 }
@@ -384,10 +397,8 @@ impl Scene {
         let Some((low, high)) = self.bounding_box() else {
             return BoundingSphere { center: Vec3::ZERO, radius: 1.0 };
         };
-        // Halves first: the sum of two large coordinates may overflow.
-        let (low, high) = (low * 0.5, high * 0.5);
-        let radius = (high - low).length();
-        BoundingSphere { center: low + high, radius: if radius > 0.0 { radius } else { 1.0 } }
+        let radius = (high - low).length() * 0.5;
+        BoundingSphere { center: (low + high) * 0.5, radius: if radius > 0.0 { radius } else { 1.0 } }
     }
 }
 

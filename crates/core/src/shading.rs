@@ -12,6 +12,9 @@ use crate::primitive::{Draw, Piece};
 /// Share of the light that comes from everywhere.
 pub const AMBIENT: f32 = 0.25;
 
+/// Greatest value of a colour: that of a half float, in which fragments are stored.
+pub const GREATEST_COLOR: Vec4 = Vec4::splat(65_504.0);
+
 /// Brightness of a surface with this camera-space normal, of any length.
 #[inline]
 pub fn light(normal: Vec3) -> f32 {
@@ -89,7 +92,8 @@ impl Surface {
                 if let Some(tex_coords) = tex_coords {
                     color *= self.texture_color(draw, *tex_coords, weights, w);
                 }
-                color
+                // Vertex colours may be anything, and coordinates so large that 1 / w is lost.
+                if color.is_nan() { draw.material.base_color } else { color.clamp(Vec4::ZERO, GREATEST_COLOR) }
             }
         };
         if draw.cutoff.is_some_and(|cutoff| base.w < cutoff) {

@@ -1,6 +1,5 @@
 //! What can go wrong between a scene's name and its picture on disk.
 
-use std::io;
 use std::path::PathBuf;
 
 /// Any error of the library.
@@ -25,9 +24,5 @@ pub enum Error {
 impl Error {
     pub(crate) fn save(path: &std::path::Path, detail: impl ToString) -> Self {
         Self::Save { path: path.to_owned(), detail: detail.to_string() }
-    }
-
-    pub(crate) fn save_io(path: &std::path::Path) -> impl FnOnce(io::Error) -> Self {
-        move |error| Self::save(path, error)
     }
 }

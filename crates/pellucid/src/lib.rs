@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+pub mod files;
 mod renderer;
 mod save;
 
@@ -36,4 +37,12 @@ pub use save::{ImageFormat, save};
 /// [`Error::Load`] if there is no such scene, or its file is not valid.
 pub fn load(source: &str) -> Result<Loaded, Error> {
     Ok(pellucid_scene::load(source)?)
+}
+
+/// Loads a scene file, whatever its name looks like; otherwise as [`load`].
+///
+/// # Errors
+/// As [`load`].
+pub fn load_file(path: &std::path::Path) -> Result<Loaded, Error> {
+    Ok(pellucid_scene::load_file(path)?)
 }

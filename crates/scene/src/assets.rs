@@ -10,7 +10,8 @@ pub trait Assets {
     /// The content of the file that `name` means: a relative path with `/` or `\`, already percent-decoded.
     ///
     /// # Errors
-    /// [`LoadError::Asset`] if there is no such file or it must not be read.
+    /// [`LoadError::Asset`] if there is no such file or it cannot be read, [`LoadError::OutsideFolder`] if it must not be
+    /// read.
     fn read(&self, name: &str) -> Result<Vec<u8>, LoadError>;
 }
 
@@ -30,21 +31,21 @@ impl Folder {
 
 impl Assets for Folder {
     fn read(&self, name: &str) -> Result<Vec<u8>, LoadError> {
-        let refused = |detail: String| LoadError::Asset { uri: shown(name), detail };
+        let refused = |detail| LoadError::OutsideFolder { uri: shown(name), detail };
         let portable = name.replace('\\', "/");
         let has_drive = portable.as_bytes().get(1) == Some(&b':');
         let path = Path::new(&portable);
         let stays_inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if has_drive || !stays_inside || name.contains('\0') {
-            return Err(refused("leads out of the scene's folder, and is not read".into()));
+        if has_drive || !stays_inside {
+            return Err(refused(""));
         }
         let full = self.root.join(path);
-        let unreadable = |error| refused(format!("cannot be read: {error}"));
+        let unreadable = |error| LoadError::Asset { uri: shown(name), detail: format!("cannot be read: {error}") };
         // A link may lead out although the name does not.
         let root = fs::canonicalize(&self.root).map_err(unreadable)?;
         let full = fs::canonicalize(&full).map_err(unreadable)?;
         if !full.starts_with(&root) {
-            return Err(refused("leads out of the scene's folder through a link, and is not read".into()));
+            return Err(refused(" through a link"));
         }
         fs::read(full).map_err(unreadable)
     }
@@ -88,6 +89,10 @@ mod tests {
         {
             assert!(folder.read(name).is_err(), "{name:?} was read");
         }
+        for name in ["../secret", "/etc/passwd", "C:\\secret"] {
+            assert!(matches!(folder.read(name), Err(LoadError::OutsideFolder { .. })), "{name:?}");
+        }
+        assert!(matches!(folder.read("missing"), Err(LoadError::Asset { .. })));
         #[cfg(unix)]
         {
             std::os::unix::fs::symlink(outer.path().join("secret"), inner.join("link")).unwrap();

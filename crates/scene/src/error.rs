@@ -44,13 +44,21 @@ pub enum LoadError {
         /// What, and where.
         detail: String,
     },
-    /// A file named inside a scene file that must not or cannot be read.
+    /// A file named inside a scene file that cannot be read.
     #[error("'{uri}', named in the file: {detail}")]
     Asset {
         /// The name as it stands in the file.
         uri: String,
         /// Why it was not read.
         detail: String,
+    },
+    /// A file named inside a scene file that lies outside the scene's folder.
+    #[error("'{uri}', named in the file, leads out of the scene's folder{detail}, and is not read")]
+    OutsideFolder {
+        /// The name as it stands in the file.
+        uri: String,
+        /// Empty, or by which way if the name does not show it.
+        detail: &'static str,
     },
     /// A built-in scene that does not exist, or a parameter it does not have or cannot take.
     #[error("{0}")]

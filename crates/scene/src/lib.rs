@@ -9,10 +9,14 @@ mod assets;
 pub mod builtin;
 mod error;
 pub mod gltf;
+mod mesh_parts;
 pub mod obj;
 pub mod ply;
+mod polygon;
 pub mod stl;
+mod text;
 mod texture_image;
+mod warnings;
 
 use std::path::Path;
 

@@ -14,6 +14,14 @@ const DECODE_LIMIT_BYTES: u64 = 3 << 30;
 /// # Errors
 /// A sentence on what is wrong with the picture.
 pub(crate) fn decode(bytes: &[u8], sampler: Sampler) -> Result<Texture, String> {
+    decode_with_alpha(bytes, sampler, |alpha| alpha)
+}
+
+/// As [`decode`], each texel's alpha replaced by what `alpha` makes of it.
+///
+/// # Errors
+/// As [`decode`].
+pub(crate) fn decode_with_alpha(bytes: &[u8], sampler: Sampler, alpha: impl Fn(u8) -> u8) -> Result<Texture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     if reader.format().is_none() {
         return Err("is neither PNG nor JPEG".into());
@@ -25,6 +33,11 @@ pub(crate) fn decode(bytes: &[u8], sampler: Sampler) -> Result<Texture, String> 
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?.into_rgba8();
     let (width, height) = picture.dimensions();
-    let texels = picture.as_raw().as_chunks::<4>().0.to_vec();
+    let texels = picture.as_raw().as_chunks::<4>().0.iter().map(|&[r, g, b, a]| [r, g, b, alpha(a)]).collect();
     Texture::new(width, height, texels, sampler).map_err(|error| error.to_string())
+}
+
+/// Width and height as the file's head states them; `None` if it cannot be read.
+pub(crate) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
+    ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()
 }

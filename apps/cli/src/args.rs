@@ -1,0 +1,203 @@
+//! The command line as it is typed. What it means, and whether it means anything, is `plan`'s affair.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Parser, Subcommand, ValueEnum};
+use pellucid::{Resolve, Technique};
+
+/// Exact transparency in any order of submission, no GPU needed.
+#[derive(Debug, Parser)]
+#[command(name = "pellucid", version, arg_required_else_help = true, after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXAMPLES: &str = "\
+SCENE is a file (.glb .gltf .obj .ply .stl) or a built-in scene: @name or @name:key=value,key=value.
+
+Examples:
+  pellucid render @gallery -o gallery.png
+  pellucid render model.glb -o model.png --opacity 0.4 --view right
+  pellucid render @boxes:n=8 -o depth.png --resolve complexity
+  pellucid info model.glb
+
+Exit codes: 0 done, 1 failed, 2 the command line is wrong.";
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render a picture, or a turntable of pictures
+    Render(Box<RenderArgs>),
+    /// Show what is in a scene, and how many layers lie behind the pixels of a view
+    Info(Box<InfoArgs>),
+    /// List the built-in scenes and their parameters
+    Scenes(ListArgs),
+    /// List the techniques: how fragments are captured and ordered
+    Techniques(ListArgs),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RenderArgs {
+    /// A file (.glb .gltf .obj .ply .stl), or a built-in: @name or @name:key=value,key=value
+    pub(crate) scene: OsString,
+
+    /// The picture: .png (8 bit, sRGB) or .exr (float, linear light, premultiplied alpha)
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+
+    #[arg(long, value_name = "NAME", default_value = "blend", hide_default_value = true, help = resolve_help())]
+    pub(crate) resolve: String,
+
+    /// Colour behind everything: a CSS name, hex (#rgb, #rrggbb, #rrggbbaa), or none for a transparent picture
+    #[arg(long, value_name = "COLOUR", default_value = DEFAULT_BACKGROUND)]
+    pub(crate) background: String,
+
+    /// Length in world units over which a material shows its stated opacity in gelly and blend:corrected [default: a
+    /// quarter of the scene's radius]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) thickness: Option<String>,
+
+    /// A turntable: N pictures, FILE-0001.png and so on, the camera going once round its target about the up axis
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) frames: Option<String>,
+
+    /// Write the figures of the frame as JSON; - for stdout
+    #[arg(long, value_name = "FILE")]
+    pub(crate) stats: Option<PathBuf>,
+
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct InfoArgs {
+    /// A file (.glb .gltf .obj .ply .stl), or a built-in: @name or @name:key=value,key=value
+    pub(crate) scene: OsString,
+
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Say nothing but the result and errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
+}
+
+/// From where, and how large.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "View")]
+pub(crate) struct ViewArgs {
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720", allow_hyphen_values = true)]
+    pub(crate) size: String,
+
+    /// The whole scene from a side, whatever camera it brought along [default: the scene's own camera, else iso, which is
+    /// azimuth 30, elevation 20]
+    #[arg(long, value_name = "SIDE", conflicts_with = "eye")]
+    pub(crate) view: Option<Side>,
+
+    /// Where the camera is; without --target it looks at the middle of the scene
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) eye: Option<String>,
+
+    /// What the camera looks at; without --eye it keeps its direction and distance and moves along
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) target: Option<String>,
+
+    /// What is up in the picture; the turntable's axis [default: 0,1,0, or the scene camera's own]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) up: Option<String>,
+
+    /// Full vertical angle of view in degrees [default: 30, or the scene camera's own]
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    pub(crate) fov: Option<String>,
+
+    /// Distance of the near plane; nothing nearer is seen [default: a thousandth of the scene's radius, or the scene
+    /// camera's own]
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    pub(crate) near: Option<String>,
+
+    /// Multiplies every material's alpha, 0 to 1; below 1 opaque materials become transparent
+    #[arg(long, value_name = "ALPHA", default_value = "1", allow_hyphen_values = true)]
+    pub(crate) opacity: String,
+
+    /// Head light on surfaces, or their base colour alone
+    #[arg(long, value_name = "HOW", default_value = "lit")]
+    pub(crate) shading: ShadingArg,
+}
+
+/// With what.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Rendering")]
+pub(crate) struct CaptureArgs {
+    /// What renders; auto takes a real GPU if there is one and this build can use it, else the CPU
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    pub(crate) backend: Backend,
+
+    /// How fragments are captured and ordered; see `pellucid techniques` [default: the backend's best]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Technique::ALL.map(Technique::name)))]
+    pub(crate) technique: Option<String>,
+
+    /// Threads; 0 is one for each core. The picture is the same on any number
+    #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
+    pub(crate) threads: String,
+
+    /// Bytes that a GPU capture may hold, such as 512M; the CPU holds one tile a thread and needs no bound
+    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
+    pub(crate) budget: Option<String>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ListArgs {
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Backend {
+    Auto,
+    Cpu,
+    Gpu,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Side {
+    Iso,
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ShadingArg {
+    Lit,
+    Unlit,
+}
+
+/// Dark and neutral, so that every colour of glass stands out before it.
+const DEFAULT_BACKGROUND: &str = "#1b1d22";
+
+fn resolve_help() -> String {
+    let width = Resolve::NAMES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let names = Resolve::NAMES.iter().map(|(name, meaning)| format!("\n  {name:width$}  {meaning}"));
+    format!("What the ordered layers become [default: blend]:{}", names.collect::<String>())
+}

@@ -1,0 +1,26 @@
+//! What each command does.
+
+pub(crate) mod info;
+pub(crate) mod render;
+pub(crate) mod scenes;
+pub(crate) mod techniques;
+
+use pellucid::Stats;
+
+use crate::terminal;
+use crate::words::plural;
+
+/// Says what a loader left out.
+fn warn_about(warnings: &[String]) {
+    for warning in warnings {
+        terminal::warn(warning);
+    }
+}
+
+/// Says which triangles a renderer left out.
+fn warn_about_dropped(stats: &Stats) {
+    if stats.dropped_triangles > 0 {
+        let triangles = plural(stats.dropped_triangles, "triangle");
+        terminal::warn(&format!("{triangles} left out: a vertex is not a number, infinite, or too far away"));
+    }
+}
