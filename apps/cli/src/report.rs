@@ -1,5 +1,7 @@
 //! The figures of a frame as JSON. Keys are stable: a change of their meaning raises [`SCHEMA`].
 
+use std::io::Write;
+
 use pellucid::{Stats, Technique, files};
 use serde::Serialize;
 
@@ -121,10 +123,7 @@ pub(crate) fn to_json(document: &impl Serialize) -> anyhow::Result<String> {
 /// Writes a document to where it was asked for.
 pub(crate) fn write(document: &str, target: &StatsTarget) -> anyhow::Result<()> {
     match target {
-        StatsTarget::Stdout => terminal::print(document)?,
-        StatsTarget::File(path) => {
-            files::write_whole(path, |writer| std::io::Write::write_all(writer, document.as_bytes()))?
-        }
+        StatsTarget::Stdout => Ok(terminal::print(document)?),
+        StatsTarget::File(path) => Ok(files::write_whole(path, |writer| writer.write_all(document.as_bytes()))?),
     }
-    Ok(())
 }

@@ -21,12 +21,24 @@ pub(crate) fn warn(sentence: &str) {
 
 /// Writes an error to stderr, its causes behind it.
 pub(crate) fn report_error(error: &anyhow::Error) {
-    note(&format!("error: {}", one_line(&format!("{error:#}"))));
+    note(&format!("error: {}", one_line(&with_causes(error))));
 }
 
 /// Whether the reader of stdout went away.
 pub(crate) fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// What went wrong and why, each said once: some errors repeat their cause in their own words.
+fn with_causes(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text += ": ";
+            text += &cause;
+        }
+    }
+    text
 }
 
 /// The text without line breaks and other control characters, which a file name or a file's content may bring in.
@@ -37,6 +49,13 @@ fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn causes_are_told_once() {
+        let error = anyhow::Error::new(io::Error::other("disk full")).context("cannot write 'a': disk full");
+        assert_eq!(with_causes(&error), "cannot write 'a': disk full");
+        assert_eq!(with_causes(&error.context("stopped")), "stopped: cannot write 'a': disk full");
+    }
 
     #[test]
     fn messages_are_one_line() {

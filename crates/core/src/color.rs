@@ -74,14 +74,15 @@ impl Srgb8Encoder {
     /// Encodes a linear channel to 8-bit sRGB: clamped to 0..=1 (NaN counts as 0), rounded to nearest.
     #[inline]
     pub fn encode(&self, linear: f32) -> u8 {
-        // Written so that NaN falls to 0.
-        if !(linear >= FIRST) {
-            return 0;
-        }
-        let number = (linear.to_bits() >> BUCKET_SHIFT) - FIRST_BUCKET;
-        match self.buckets.get(number as usize) {
-            Some(bucket) => bucket.start + u8::from(linear >= bucket.threshold),
-            None => 255,
+        if linear >= FIRST {
+            let number = (linear.to_bits() >> BUCKET_SHIFT) - FIRST_BUCKET;
+            match self.buckets.get(number as usize) {
+                Some(bucket) => bucket.start + u8::from(linear >= bucket.threshold),
+                None => 255,
+            }
+        } else {
+            // NaN too.
+            0
         }
     }
 }

@@ -98,8 +98,9 @@ impl Viewport {
         let guard = (GUARD_BAND_PX * SUBPIXELS) as f32;
         let snap = |ndc: f32, half: i32| (ndc * half as f32).max(-guard).min(guard).round_ties_even() as i32;
         let (x, y) = (snap(clip.x * inv_w, self.half_x), snap(clip.y * inv_w, self.half_y));
-        // `max` turns NaN into 0, adding zero turns -0 into 0: order keys are made of the bits.
-        let depth = (clip.z * inv_w).max(0.0).min(1.0) + 0.0;
+        // Order keys are made of the bits: `max` turns NaN into 0, adding zero turns -0 into 0.
+        let depth = (clip.z * inv_w).max(0.0) + 0.0;
+        let depth = depth.min(1.0);
         ScreenVertex { x: self.half_x + x, y: self.half_y - y, depth, inv_w }
     }
 }

@@ -49,7 +49,8 @@ pub struct Draw<'a> {
     pub opacity: f32,
     /// Whether it is lit.
     pub lit: bool,
-    /// Whether back faces are left out.
+    /// Whether back faces are left out: as the material says, unless it is only the view's opacity that lets one see
+    /// through it.
     pub culls_back_faces: bool,
     /// Whether the transform mirrors, so that front faces run clockwise.
     pub mirrored: bool,
@@ -98,7 +99,9 @@ pub fn draws<'a>(scene: &'a Scene, view: &View) -> Result<Vec<Draw<'a>>, Error> 
             blends: material.alpha_mode == AlphaMode::Blend,
             opacity: view.opacity,
             lit: view.shading == Shading::Lit && !material.unlit,
-            culls_back_faces: !material.double_sided,
+            // Single-sidedness is a saving meant for solids one cannot see into.
+            culls_back_faces: !material.double_sided
+                && (pass == Pass::Opaque || material.alpha_mode == AlphaMode::Blend),
             mirrored: world_from_mesh.matrix3.determinant() < 0.0,
         });
         first_primitive += mesh.triangles().len() as u32;

@@ -10,7 +10,11 @@ use glam::{DVec2, DVec3, Vec3};
 /// Triangle tests allowed a corner, and a polygon, before the rest of it becomes a fan: a bound on time that sets in at
 /// some 5000 corners.
 const TESTS_PER_CORNER: usize = 4000;
-const TESTS_PER_POLYGON: usize = 200_000_000;
+const TESTS_PER_POLYGON: usize = 50_000_000;
+
+/// What a warning says of [`Triangulator::bad`].
+pub(crate) const BAD_POLYGONS: &str =
+    "polygons that cross themselves or have very many corners, so that their triangles may overlap";
 
 /// Cuts polygons into triangles, and counts those that cannot be cut well.
 #[derive(Default)]

@@ -23,10 +23,10 @@ impl Warnings {
         }
     }
 
-    /// Adds a sentence that begins with a number, unless that is 0.
-    pub(crate) fn add_count(&mut self, count: usize, sentence: &str) {
+    /// Adds how many of something there are, unless there are none.
+    pub(crate) fn add_count(&mut self, what: &str, count: usize) {
         if count > 0 {
-            self.add(format!("{count} {sentence}"));
+            self.add(format!("{what}: {count}"));
         }
     }
 

@@ -10,7 +10,7 @@ use crate::commands::{warn_about, warn_about_dropped};
 use crate::plan::{RenderPlan, StatsTarget};
 use crate::progress::Progress;
 use crate::report::{self, Figures, Run};
-use crate::words::{duration, short_count};
+use crate::words::{duration, plural, short_count};
 use crate::{UsageError, camera, legend, terminal};
 
 pub(crate) fn run(plan: &RenderPlan) -> anyhow::Result<()> {
@@ -85,8 +85,11 @@ impl Job<'_> {
             warn_about_dropped(&stats);
             let Stats { width, height, .. } = &stats;
             let mean = duration(total_ms / f64::from(count));
+            let last = numbered(&self.plan.output, count);
+            let pictures = plural(count.into(), "picture");
             terminal::note(&format!(
-                "{first} and on: {count} x {width} x {height}, {mean} a picture ({})",
+                "{first} to {}: {pictures}, {width} x {height}, {mean} each ({})",
+                last.display(),
                 rendered_by(&stats)
             ));
         });

@@ -11,7 +11,7 @@ pub(super) struct Tick {
 }
 
 /// Characters between two numbers at least.
-const GAP: u32 = 2;
+const GAP: u32 = 1;
 
 /// 0, the end of the scale, and as many round numbers between them as there is room for, under the middles of their shares
 /// of a bar of this width.
@@ -27,7 +27,7 @@ pub(super) fn ticks(full_scale: u32, bar_width: u32, character_width: u32) -> Ve
     let (first, last) = (tick(0), tick(end));
     let free = first.label_left + label_width(0) + gap..(last.label_left + 1).saturating_sub(gap);
 
-    let widest = u64::from(label_width(end) + gap);
+    let widest = u64::from(label_width(end) + 2 * gap);
     let step = round_numbers().take_while(|&step| step < end).find(|&step| bar * step / (end + 1) >= widest);
     let between = step.into_iter().flat_map(|step| (1..).map(move |i| i * step).take_while(|&count| count < end));
     let between = between

@@ -10,6 +10,7 @@ use super::mtl::{Definition, Map};
 use super::texture::{Alpha, Textures};
 use super::{Corner, FORMAT, NONE, Part, Reader, linear};
 use crate::mesh_parts::repair_normals;
+use crate::polygon::BAD_POLYGONS;
 use crate::text::shown;
 use crate::warnings::Warnings;
 use crate::{Assets, LoadError, Loaded};
@@ -27,9 +28,9 @@ impl Reader<'_> {
         if self.parts.iter().any(|part| part.corners.len() > NONE as usize) {
             return Err(invalid("a material has more than 2^32 vertices"));
         }
-        self.warnings.add_count(self.skipped_elements, "line and point elements are left out");
-        self.warnings.add_count(self.skipped_surfaces, "free-form curves and surfaces are left out");
-        self.warnings.add_count(self.triangulator.bad, "polygons cross themselves; their triangles may overlap");
+        self.warnings.add_count("lines and points, left out", self.skipped_elements);
+        self.warnings.add_count("free-form curves and surfaces, left out", self.skipped_surfaces);
+        self.warnings.add_count(BAD_POLYGONS, self.triangulator.bad);
         if !self.colors.is_empty() {
             self.colors.resize(self.positions.len(), glam::Vec4::ONE);
         }

@@ -20,7 +20,7 @@ use pellucid_core::color::{linear_from_srgb, linear_from_srgb8};
 use pellucid_core::{AlphaMode, Instance, Material, Mesh, Scene};
 
 use crate::mesh_parts::repair_normals;
-use crate::polygon::Triangulator;
+use crate::polygon::{BAD_POLYGONS, Triangulator};
 use crate::warnings::Warnings;
 use crate::{Assets, LoadError, Loaded};
 use body::{Ascii, Big, Binary, Little, Source};
@@ -273,8 +273,8 @@ impl Content {
         if triangles.is_empty() {
             return Err(LoadError::Malformed { format: FORMAT, detail: "none of its faces has an area".into() });
         }
-        self.warnings.add_count(self.too_small, "faces with fewer than 3 corners are left out");
-        self.warnings.add_count(triangulator.bad, "polygons cross themselves; their triangles may overlap");
+        self.warnings.add_count("faces with fewer than 3 corners, left out", self.too_small);
+        self.warnings.add_count(BAD_POLYGONS, triangulator.bad);
 
         let transparent = self.colors.iter().any(|color| color.w < 1.0);
         let alpha_mode = if transparent { AlphaMode::Blend } else { AlphaMode::Opaque };
