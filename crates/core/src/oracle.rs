@@ -10,7 +10,7 @@ use crate::layers::OpaqueSurface;
 use crate::pixel_grid::{Viewport, depth_at};
 use crate::primitive::{Draw, NotFinite, Pass, Piece, draws};
 use crate::resolve::{PixelResolver, finish};
-use crate::shading::Surface;
+use crate::shading::{NormalPlane, Varying, color_at};
 use crate::stats::Step;
 use crate::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View, fragment};
 
@@ -83,8 +83,10 @@ fn rasterize(
     buffer: &mut [Vec<Fragment>],
     ambiguous: &mut [bool],
 ) {
-    let surface = Surface::new(draw, triangle, piece);
-    let depth_plane = piece.triangle.depth_plane(piece.triangle.weight_planes());
+    let weights = piece.triangle.weight_planes();
+    let depth_plane = piece.triangle.depth_plane(weights);
+    let normal = NormalPlane::new(draw, triangle, piece, weights);
+    let varying = draw.varies().then(|| Varying::new(draw, triangle, piece, weights));
     let [anchor_x, anchor_y] = piece.triangle.anchor_px();
     for y in 0..view.height as i32 {
         for x in 0..view.width as i32 {
@@ -95,8 +97,9 @@ fn rasterize(
             if !piece.triangle.covers(x, y) {
                 continue;
             }
-            if let Some(color) = surface.color(draw, x, y) {
-                let depth = depth_at(&depth_plane, piece.triangle.depth_range(), x - anchor_x, y - anchor_y);
+            let (x, y) = (x - anchor_x, y - anchor_y);
+            if let Some(color) = color_at(draw, &normal, varying.as_ref(), x, y) {
+                let depth = depth_at(&depth_plane, piece.triangle.depth_range(), x, y);
                 buffer[pixel].push(Fragment { color, depth, primitive: draw.first_primitive + triangle as u32 });
             }
         }

@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Mul};
 
-use glam::{DAffine3, DMat4, DVec3, Mat3, Mat4, Vec3, Vec4};
+use glam::{DAffine3, DMat4, DVec3, Mat3A, Mat4, Vec3, Vec4};
 
 use crate::clip::clip_triangle;
 use crate::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, outcode, twice_signed_area};
@@ -33,10 +33,8 @@ pub struct Draw<'a> {
     pub texture: Option<(&'a Texture, MaterialTexture)>,
     /// Clip space from the mesh's own.
     pub clip_from_mesh: Mat4,
-    /// Camera space from the mesh's own.
-    pub view_from_mesh: Mat4,
     /// Turns normals into camera space, up to a factor.
-    pub view_from_normal: Mat3,
+    pub view_from_normal: Mat3A,
     /// Number of its first triangle in draw order.
     pub first_primitive: u32,
     /// Which part of the frame it belongs to.
@@ -47,6 +45,8 @@ pub struct Draw<'a> {
     pub blends: bool,
     /// Multiplies alpha.
     pub opacity: f32,
+    /// The material's base colour as it is captured where nothing varies: premultiplied, unlit.
+    pub base_color: Vec4,
     /// Whether it is lit.
     pub lit: bool,
     /// Whether back faces are left out: as the material says, unless it is only the view's opacity that lets one see
@@ -83,7 +83,7 @@ pub fn draws<'a>(scene: &'a Scene, view: &View) -> Result<Vec<Draw<'a>>, Error> 
             AlphaMode::Mask { cutoff } => (Pass::Transparent, Some(cutoff)),
             AlphaMode::Opaque | AlphaMode::Blend => (Pass::Transparent, None),
         };
-        draws.push(Draw {
+        let mut draw = Draw {
             mesh,
             material,
             texture: material
@@ -91,19 +91,21 @@ pub fn draws<'a>(scene: &'a Scene, view: &View) -> Result<Vec<Draw<'a>>, Error> 
                 .filter(|_| mesh.tex_coords().is_some())
                 .map(|texture| (scene.texture(texture.texture), texture)),
             clip_from_mesh: (clip_from_view * view_from_mesh).as_mat4(),
-            view_from_mesh: view_from_mesh.as_mat4(),
             view_from_normal: view_from_normal(&view_from_mesh),
             first_primitive,
             pass,
             cutoff,
             blends: material.alpha_mode == AlphaMode::Blend,
             opacity: view.opacity,
+            base_color: Vec4::ZERO,
             lit: view.shading == Shading::Lit && !material.unlit,
             // Single-sidedness is a saving meant for solids one cannot see into.
             culls_back_faces: !material.double_sided
                 && (pass == Pass::Opaque || material.alpha_mode == AlphaMode::Blend),
             mirrored: world_from_mesh.matrix3.determinant() < 0.0,
-        });
+        };
+        draw.base_color = draw.premultiplied(material.base_color);
+        draws.push(draw);
         first_primitive += mesh.triangles().len() as u32;
     }
     Ok(draws)
@@ -111,13 +113,13 @@ pub fn draws<'a>(scene: &'a Scene, view: &View) -> Result<Vec<Draw<'a>>, Error> 
 
 /// The cofactors of a transform's linear part: its inverse transpose times its determinant. Unlike the inverse they exist
 /// for flattening transforms too; the factor goes when normals are normalised. Scaled to keep clear of f32's limits.
-fn view_from_normal(view_from_mesh: &DMat4) -> Mat3 {
+fn view_from_normal(view_from_mesh: &DMat4) -> Mat3A {
     let [x, y, z] = [view_from_mesh.x_axis, view_from_mesh.y_axis, view_from_mesh.z_axis].map(|axis| axis.truncate());
     let columns = [y.cross(z), z.cross(x), x.cross(y)];
     let greatest = columns.iter().fold(0.0f64, |greatest, column| greatest.max(column.abs().max_element()));
     let scale = if greatest > 0.0 { 1.0 / greatest } else { 0.0 };
-    let [x, y, z] = columns.map(|column: DVec3| (column * scale).as_vec3());
-    Mat3::from_cols(x, y, z)
+    let [x, y, z] = columns.map(|column: DVec3| (column * scale).as_vec3a());
+    Mat3A::from_cols(x, y, z)
 }
 
 /// A point as clip coordinates, in the order of operations that every renderer keeps.

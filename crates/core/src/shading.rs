@@ -2,9 +2,10 @@
 //!
 //! The head light shines along the line of sight of the camera, so a surface's brightness depends on its normal alone.
 //! Interpolated normals are normalised at every fragment; a perspective division before that would change only their
-//! length, so it is left out.
+//! length, so it is left out. Every surface is lit by a [`NormalPlane`]: a flat one's does not change over the screen, an
+//! unlit one's faces the camera. Where colour varies too, [`Varying`] holds its parts.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3A, Vec4};
 
 use crate::pixel_grid::Plane;
 use crate::primitive::{Draw, Piece};
@@ -15,40 +16,83 @@ pub const AMBIENT: f32 = 0.25;
 /// Greatest value of a colour: that of a half float, in which fragments are stored.
 pub const GREATEST_COLOR: Vec4 = Vec4::splat(65_504.0);
 
-/// Brightness of a surface with this camera-space normal, of any length.
-#[inline]
-pub fn light(normal: Vec3) -> f32 {
+/// Brightness of a surface with this camera-space normal, of any length: 1 facing the camera.
+#[inline(always)]
+pub fn light(normal: Vec3A) -> f32 {
     let length = normal.dot(normal).sqrt();
-    // A normal without direction is taken to face the camera. Not `<=`: NaN has none either.
-    let lambert = if length > 0.0 && length.is_finite() { normal.z.abs() / length } else { 1.0 };
+    // A normal without direction is taken to face the camera. NaN has none either.
+    let lambert = if length > 0.0 && length < f32::INFINITY { normal.z.abs() / length } else { 1.0 };
     AMBIENT + (1.0 - AMBIENT) * lambert
 }
 
-/// A piece of a primitive, ready to be shaded at any pixel. Attributes at corners are divided by w: affine on the screen.
+/// A piece's camera-space normal over w, affine on the screen: `(value + y * dy) + x * dx`, in pixels from the piece's
+/// anchor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormalPlane {
+    /// Normal at the anchor.
+    pub value: Vec3A,
+    /// Change for one pixel to the right.
+    pub dx: Vec3A,
+    /// Change for one pixel downwards.
+    pub dy: Vec3A,
+}
+
+impl NormalPlane {
+    /// The normals of a piece of one triangle of a draw's mesh, whose [`weight_planes`] are given.
+    ///
+    /// [`weight_planes`]: crate::pixel_grid::ScreenTriangle::weight_planes
+    #[inline(always)]
+    pub fn new(draw: &Draw<'_>, triangle: usize, piece: &Piece, weights: [Plane; 2]) -> Self {
+        let constant = |value| Self { value, dx: Vec3A::ZERO, dy: Vec3A::ZERO };
+        if !draw.lit {
+            return constant(Vec3A::Z);
+        }
+        let [i, j, k] = draw.mesh.triangles()[triangle];
+        let (i, j, k) = (i as usize, j as usize, k as usize);
+        let Some(normals) = draw.mesh.normals() else {
+            let positions = draw.mesh.positions();
+            let (a, b, c) = (positions[i], positions[j], positions[k]);
+            return constant(draw.view_from_normal * Vec3A::from((b - a).cross(c - a)));
+        };
+        let corner = |vertex: usize| draw.view_from_normal * Vec3A::from(normals[vertex]);
+        let [a, b, c] = piece.corners.attribute([corner(i), corner(j), corner(k)]);
+        let [va, vb, vc] = &piece.triangle.vertices;
+        let a = a * va.inv_w;
+        let (to_b, to_c) = (b * vb.inv_w - a, c * vc.inv_w - a);
+        let [second, third] = weights;
+        Self {
+            value: a + (to_b * second.value as f32 + to_c * third.value as f32),
+            dx: to_b * second.dx as f32 + to_c * third.dx as f32,
+            dy: to_b * second.dy as f32 + to_c * third.dy as f32,
+        }
+    }
+
+    /// Brightness `x` pixels to the right of the anchor and `y` below it.
+    #[inline(always)]
+    pub fn light_at(&self, x: i32, y: i32) -> f32 {
+        light((self.value + self.dy * y as f32) + self.dx * x as f32)
+    }
+}
+
+/// A premultiplied colour in this light.
+#[inline(always)]
+pub fn lit(premultiplied: Vec4, light: f32) -> Vec4 {
+    premultiplied * Vec4::new(light, light, light, 1.0)
+}
+
+/// The parts of a colour that varies over a piece, or has to pass an alpha test. Attributes at corners are divided by w:
+/// affine on the screen.
 #[derive(Debug, Clone)]
-pub struct Surface {
-    anchor_px: [i32; 2],
+pub struct Varying {
     weights: [Plane; 2],
     inv_w: [f32; 3],
-    color: SurfaceColor,
-    light: SurfaceLight,
+    vertex_colors: Option<[Vec4; 3]>,
+    tex_coords: Option<[Vec2; 3]>,
 }
 
-#[derive(Debug, Clone)]
-enum SurfaceColor {
-    Constant(Vec4),
-    Varying { vertex_colors: Option<[Vec4; 3]>, tex_coords: Option<[Vec2; 3]> },
-}
-
-#[derive(Debug, Clone)]
-enum SurfaceLight {
-    Constant(f32),
-    Normals([Vec3; 3]),
-}
-
-impl Surface {
-    /// A piece of one triangle of a draw's mesh.
-    pub fn new(draw: &Draw<'_>, triangle: usize, piece: &Piece) -> Self {
+impl Varying {
+    /// For a piece of one triangle of a draw's mesh; only where [`Draw::varies`].
+    pub fn new(draw: &Draw<'_>, triangle: usize, piece: &Piece, weights: [Plane; 2]) -> Self {
         let vertices = draw.mesh.triangles()[triangle].map(|vertex| vertex as usize);
         let inv_w = piece.triangle.vertices.map(|vertex| vertex.inv_w);
         let vertex_colors = draw.mesh.colors().map(|colors| {
@@ -61,58 +105,28 @@ impl Surface {
             let [a, b, c] = piece.corners.attribute(moved);
             Some([a * inv_w[0], b * inv_w[1], c * inv_w[2]])
         });
-        let color = if vertex_colors.is_none() && tex_coords.is_none() {
-            SurfaceColor::Constant(draw.material.base_color)
-        } else {
-            SurfaceColor::Varying { vertex_colors, tex_coords }
-        };
-        let light = match draw.mesh.normals() {
-            _ if !draw.lit => SurfaceLight::Constant(1.0),
-            None => SurfaceLight::Constant(light(flat_normal(draw, vertices))),
-            Some(normals) => {
-                let [a, b, c] = piece.corners.attribute(vertices.map(|vertex| draw.view_from_normal * normals[vertex]));
-                SurfaceLight::Normals([a * inv_w[0], b * inv_w[1], c * inv_w[2]])
-            }
-        };
-        Self { anchor_px: piece.triangle.anchor_px(), weights: piece.triangle.weight_planes(), inv_w, color, light }
+        Self { weights, inv_w, vertex_colors, tex_coords }
     }
 
-    /// The colour at a pixel, linear light and premultiplied alpha; `None` where the alpha test fails. `draw` is the one
-    /// the surface was made of.
-    pub fn color(&self, draw: &Draw<'_>, x_px: i32, y_px: i32) -> Option<Vec4> {
-        let weights = self.weights_at(x_px, y_px);
-        let base = match &self.color {
-            SurfaceColor::Constant(color) => *color,
-            SurfaceColor::Varying { vertex_colors, tex_coords } => {
-                let w = 1.0 / interpolate(self.inv_w, weights);
-                let mut color = draw.material.base_color;
-                if let Some(vertex_colors) = vertex_colors {
-                    color *= interpolate(*vertex_colors, weights) * w;
-                }
-                if let Some(tex_coords) = tex_coords {
-                    color *= self.texture_color(draw, *tex_coords, weights, w);
-                }
-                // Vertex colours may be anything, and coordinates so large that 1 / w is lost.
-                if color.is_nan() { draw.material.base_color } else { color.clamp(Vec4::ZERO, GREATEST_COLOR) }
-            }
-        };
-        if draw.cutoff.is_some_and(|cutoff| base.w < cutoff) {
+    /// The colour, premultiplied and unlit, `x` pixels to the right of the anchor and `y` below it; `None` where the alpha
+    /// test fails.
+    pub fn color_at(&self, draw: &Draw<'_>, x: i32, y: i32) -> Option<Vec4> {
+        let [second, third] = self.weights.map(|plane| plane.at(x, y) as f32);
+        let weights = [1.0 - second - third, second, third];
+        let mut color = draw.material.base_color;
+        let w = 1.0 / interpolate(self.inv_w, weights);
+        if let Some(vertex_colors) = self.vertex_colors {
+            color *= interpolate(vertex_colors, weights) * w;
+        }
+        if let Some(tex_coords) = self.tex_coords {
+            color *= self.texture_color(draw, tex_coords, weights, w);
+        }
+        // Vertex colours may be anything, and coordinates so large that 1 / w is lost.
+        let color = if color.is_nan() { draw.material.base_color } else { color.clamp(Vec4::ZERO, GREATEST_COLOR) };
+        if draw.cutoff.is_some_and(|cutoff| color.w < cutoff) {
             return None;
         }
-        let alpha = if draw.blends { base.w.clamp(0.0, 1.0) * draw.opacity } else { draw.opacity };
-        let light = match &self.light {
-            SurfaceLight::Constant(light) => *light,
-            SurfaceLight::Normals(normals) => light(interpolate(*normals, weights)),
-        };
-        Some((base.truncate() * (light * alpha)).extend(alpha))
-    }
-
-    /// The screen-space barycentric weights of the three corners at a pixel.
-    #[inline]
-    fn weights_at(&self, x_px: i32, y_px: i32) -> [f32; 3] {
-        let (x, y) = (x_px - self.anchor_px[0], y_px - self.anchor_px[1]);
-        let [second, third] = self.weights.map(|plane| plane.at(x, y) as f32);
-        [1.0 - second - third, second, third]
+        Some(draw.premultiplied(color))
     }
 
     fn texture_color(&self, draw: &Draw<'_>, tex_coords: [Vec2; 3], weights: [f32; 3], w: f32) -> Vec4 {
@@ -130,10 +144,30 @@ impl Surface {
     }
 }
 
-/// The camera-space normal of a triangle's plane, of any length and either sign.
-fn flat_normal(draw: &Draw<'_>, vertices: [usize; 3]) -> Vec3 {
-    let [a, b, c] = vertices.map(|vertex| draw.mesh.positions()[vertex]);
-    draw.view_from_normal * (b - a).cross(c - a)
+impl Draw<'_> {
+    /// Whether colour varies over a triangle or has to pass an alpha test; if not it is [`Draw::base_color`] in the light.
+    #[inline(always)]
+    pub fn varies(&self) -> bool {
+        self.cutoff.is_some() || self.texture.is_some() || self.mesh.colors().is_some()
+    }
+
+    /// A colour of this draw, given straight, as it is captured: its alpha as material and view say, premultiplied.
+    #[inline(always)]
+    pub fn premultiplied(&self, color: Vec4) -> Vec4 {
+        let alpha = if self.blends { color.w.min(1.0) * self.opacity } else { self.opacity };
+        (color.truncate() * alpha).extend(alpha)
+    }
+}
+
+/// The colour of a piece at a pixel, relative to its anchor: linear light, premultiplied; `None` where the alpha test
+/// fails.
+#[inline(always)]
+pub fn color_at(draw: &Draw<'_>, normal: &NormalPlane, varying: Option<&Varying>, x: i32, y: i32) -> Option<Vec4> {
+    let color = match varying {
+        None => draw.base_color,
+        Some(varying) => varying.color_at(draw, x, y)?,
+    };
+    Some(lit(color, normal.light_at(x, y)))
 }
 
 #[inline]
@@ -151,4 +185,27 @@ where
     T: Copy + std::ops::Add<Output = T> + std::ops::Sub<Output = T> + std::ops::Mul<f32, Output = T>,
 {
     (b - a) * second + (c - a) * third
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn light_depends_on_the_angle_alone() {
+        assert_eq!(light(Vec3A::Z), 1.0);
+        assert_eq!(light(Vec3A::NEG_Z * 1e-10), 1.0);
+        assert_eq!(light(Vec3A::X), AMBIENT);
+        let slanted = Vec3A::from(Vec3::new(3.0, 0.0, 4.0));
+        assert!((light(slanted) - (AMBIENT + (1.0 - AMBIENT) * 0.8)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_normal_without_direction_is_lit_as_if_it_faced_the_camera() {
+        for normal in [Vec3A::ZERO, Vec3A::NAN, Vec3A::INFINITY, Vec3A::splat(1e-30), Vec3A::splat(1e30)] {
+            assert_eq!(light(normal), 1.0);
+        }
+    }
 }

@@ -43,7 +43,7 @@ pub struct View {
 }
 
 impl View {
-    /// A view of `scene` at 1280 x 720 on a dark neutral background: through the scene's own first camera, else fitted
+    /// A view of `scene` at 1280 x 720 with nothing behind: through the scene's own first camera, else fitted
     /// to its bounding sphere, from azimuth 30 and elevation 20 degrees.
     pub fn of(scene: &Scene) -> Self {
         let sphere = scene.bounding_sphere();

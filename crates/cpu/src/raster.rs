@@ -3,9 +3,10 @@
 //! The edge functions of the contract are 64-bit integers in subpixels. Seen from a tile they fit 32 bits: values at
 //! neighbouring pixel centres differ by multiples of 256, so dividing by 256 and rounding down changes no sign; an edge
 //! with the whole tile inside is left out, and for any other one the value at a pixel of the tile is at most
-//! 31 * (2^23 + 2^23) from zero.
+//! 31 * (2^23 + 2^23) from zero. A row of the tile is then a mask of 32 bits, made eight samples at a time.
 
-use pellucid_core::pixel_grid::{ScreenTriangle, center, depth_at};
+use fearless_simd::{Simd, SimdBase, SimdMask, i32x8};
+use pellucid_core::pixel_grid::{Plane, ScreenTriangle, center};
 
 use crate::bin::{PixelRect, TILE_PX};
 
@@ -20,44 +21,109 @@ struct TileEdge {
     value: i32,
 }
 
-/// Calls `cover` with the index in the tile (row by row, [`TILE_PX`] apart), the pixel's column and row in the picture
-/// and the depth, for each sample of the tile that the triangle covers.
-#[inline]
-pub(crate) fn rasterize(
+/// Where a triangle's depth is computed from.
+#[derive(Clone, Copy)]
+pub(crate) struct Depths {
+    plane: Plane,
+    range: [f32; 2],
+    /// Pixels from the anchor to the tile's top left pixel.
+    left: i32,
+    top: i32,
+}
+
+/// The samples of a tile that a triangle covers: rows `top..=bottom` of the tile, a bit for each column.
+pub(crate) struct Coverage {
+    pub(crate) top: usize,
+    pub(crate) bottom: usize,
+    pub(crate) rows: [u32; TILE_PX as usize],
+}
+
+/// Lanes of a vector of edge values.
+const LANES: i32 = 8;
+
+/// Finds the samples of a tile that a triangle covers, among those in `samples`; `false` if there are none.
+#[inline(always)]
+pub(crate) fn cover<S: Simd>(
+    simd: S,
     triangle: &ScreenTriangle,
     samples: PixelRect,
     tile: PixelRect,
-    mut cover: impl FnMut(usize, i32, i32, f32),
-) {
+    coverage: &mut Coverage,
+) -> bool {
     let mut edges = [TileEdge::default(); 3];
+    let mut whole = true;
     for (tile_edge, edge) in edges.iter_mut().zip(&triangle.edges) {
         let value = edge.biased_at(center(tile.left), center(tile.top)) >> 8;
         let (across, down) = (edge.a * i64::from(TILE_PX - 1), edge.b * i64::from(TILE_PX - 1));
         if value + across.max(0) + down.max(0) < 0 {
-            return;
+            return false;
         }
         if value + across.min(0) + down.min(0) < 0 {
             *tile_edge = TileEdge { dx: edge.a as i32, dy: edge.b as i32, value: value as i32 };
+            whole = false;
         }
     }
-    let left = samples.left.max(tile.left);
-    let right = samples.right.min(tile.right);
-    let top = samples.top.max(tile.top);
-    let bottom = samples.bottom.min(tile.bottom);
-    let depth_plane = triangle.depth_plane(triangle.weight_planes());
-    let depth_range = triangle.depth_range();
-    let [anchor_x, anchor_y] = triangle.anchor_px();
-    for y in top..=bottom {
-        let row = (y - tile.top) as usize * TILE_PX as usize;
-        let mut values = edges.map(|edge| edge.value + edge.dx * (left - tile.left) + edge.dy * (y - tile.top));
-        for x in left..=right {
-            if values[0] | values[1] | values[2] >= 0 {
-                let depth = depth_at(&depth_plane, depth_range, x - anchor_x, y - anchor_y);
-                cover(row + (x - tile.left) as usize, x, y, depth);
-            }
-            for (value, edge) in values.iter_mut().zip(&edges) {
-                *value = value.wrapping_add(edge.dx);
-            }
+    let left = samples.left.max(tile.left) - tile.left;
+    let right = samples.right.min(tile.right) - tile.left;
+    let top = samples.top.max(tile.top) - tile.top;
+    let bottom = samples.bottom.min(tile.bottom) - tile.top;
+    if left > right || top > bottom {
+        return false;
+    }
+    coverage.top = top as usize;
+    coverage.bottom = bottom as usize;
+    let columns = (u32::MAX >> (31 - (right - left))) << left;
+    let rows = &mut coverage.rows[top as usize..=bottom as usize];
+    if whole {
+        rows.fill(columns);
+        return true;
+    }
+    let lanes = i32x8::from_slice(simd, &[0, 1, 2, 3, 4, 5, 6, 7]);
+    let [a, b, c] = edges;
+    let (ramp_a, ramp_b, ramp_c) = (lanes * a.dx, lanes * b.dx, lanes * c.dx);
+    let mut any = 0;
+    for (y, row) in (top..).zip(rows) {
+        let mut value_a = a.value + a.dy * y + a.dx * left;
+        let mut value_b = b.value + b.dy * y + b.dx * left;
+        let mut value_c = c.value + c.dy * y + c.dx * left;
+        let mut mask = 0u64;
+        let mut x = left;
+        while x <= right {
+            let inside = (ramp_a + value_a) | (ramp_b + value_b) | (ramp_c + value_c);
+            mask |= inside.simd_ge(i32x8::splat(simd, 0)).to_bitmask() << x;
+            x += LANES;
+            value_a = value_a.wrapping_add(a.dx * LANES);
+            value_b = value_b.wrapping_add(b.dx * LANES);
+            value_c = value_c.wrapping_add(c.dx * LANES);
         }
+        *row = mask as u32 & columns;
+        any |= *row;
+    }
+    any != 0
+}
+
+impl Depths {
+    #[inline(always)]
+    pub(crate) fn new(triangle: &ScreenTriangle, weights: [Plane; 2], tile: PixelRect) -> Self {
+        let [anchor_x, anchor_y] = triangle.anchor_px();
+        Self {
+            plane: triangle.depth_plane(weights),
+            range: triangle.depth_range(),
+            left: tile.left - anchor_x,
+            top: tile.top - anchor_y,
+        }
+    }
+
+    /// The plane's value left of row `y` of the tile.
+    #[inline(always)]
+    pub(crate) fn row(&self, y: usize) -> f64 {
+        self.plane.value + f64::from(self.top + y as i32) * self.plane.dy
+    }
+
+    /// Depth in column `x` of a row.
+    #[inline(always)]
+    pub(crate) fn at(&self, row: f64, x: usize) -> f32 {
+        let value = row + f64::from(self.left + x as i32) * self.plane.dx;
+        (value as f32).max(self.range[0]).min(self.range[1])
     }
 }

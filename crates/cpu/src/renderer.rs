@@ -3,6 +3,7 @@
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
+use fearless_simd::Level;
 use glam::Vec4;
 use pellucid_core::pixel_grid::{ScreenVertex, Viewport};
 use pellucid_core::primitive::{Draw, draws};
@@ -14,13 +15,14 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bin::{TILE_PX, TileGrid};
 use crate::setup::{Chunk, chunk_spans};
-use crate::tile::{FragmentCounts, TileCapture};
+use crate::tile::{FragmentCounts, FrameParts, TileCapture};
 use crate::transform::{groups, transform};
 
 /// Renders on all cores. Keep it from frame to frame: it holds on to its threads and memory.
 #[derive(Debug)]
 pub struct CpuRenderer {
     threads: usize,
+    level: Level,
     pool: OnceLock<ThreadPool>,
     memory: Mutex<Memory>,
 }
@@ -39,6 +41,7 @@ struct Binned<'a> {
     draws: Vec<Draw<'a>>,
     grid: TileGrid,
     chunks: Vec<Chunk>,
+    level: Level,
     stats: Stats,
     start: Instant,
 }
@@ -46,7 +49,14 @@ struct Binned<'a> {
 impl CpuRenderer {
     /// A renderer on this many threads; 0: one for each core. They are started with the first frame.
     pub fn new(threads: usize) -> Self {
-        Self { threads, pool: OnceLock::new(), memory: Mutex::default() }
+        Self { threads, level: Level::new(), pool: OnceLock::new(), memory: Mutex::default() }
+    }
+
+    /// The same renderer at another SIMD level than the best of this machine. The picture is the same at any.
+    #[must_use]
+    pub fn level(mut self, level: Level) -> Self {
+        self.level = level;
+        self
     }
 
     /// Renders a view.
@@ -55,21 +65,21 @@ impl CpuRenderer {
     /// If the view is invalid or the threads cannot be started.
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
         self.run(|memory| {
-            let mut binned = bin_scene(scene, view, memory)?;
+            let mut binned = bin_scene(scene, view, self.level, memory)?;
             let mut image = Image::filled(view.width, view.height, Vec4::ZERO);
             let tiles = Mutex::new(tile_rows(&mut image, &binned.grid));
             let resolver = PixelResolver::new(resolve, view);
-            let draws = &binned.draws;
+            let frame = binned.parts();
             let (counts, bytes) = for_each_tile(&binned, memory, |number, capture, layers| {
                 let mut rows = {
                     let mut tiles = tiles.lock().unwrap_or_else(PoisonError::into_inner);
                     std::mem::take(&mut tiles[number as usize])
                 };
                 if resolve == Resolve::Blend {
-                    capture.blend(draws, view.background, &mut rows);
+                    capture.blend(frame, view.background, &mut rows);
                     return;
                 }
-                capture.layers(draws, layers);
+                capture.layers(frame.draws, layers);
                 for (y, row) in rows.iter_mut().enumerate() {
                     for (x, pixel) in row.iter_mut().enumerate() {
                         let (x, y) = (x as u32, y as u32);
@@ -90,10 +100,10 @@ impl CpuRenderer {
     /// If the view is invalid or the threads cannot be started.
     pub fn layers(&self, scene: &Scene, view: &View, visit: impl Fn(&Layers) + Sync) -> Result<Stats, Error> {
         self.run(|memory| {
-            let mut binned = bin_scene(scene, view, memory)?;
-            let draws = &binned.draws;
+            let mut binned = bin_scene(scene, view, self.level, memory)?;
+            let frame = binned.parts();
             let (counts, bytes) = for_each_tile(&binned, memory, |_, capture, layers| {
-                capture.layers(draws, layers);
+                capture.layers(frame.draws, layers);
                 visit(layers);
             });
             Ok(binned.finish(counts, bytes, memory, scene))
@@ -121,7 +131,7 @@ impl CpuRenderer {
 }
 
 /// Transforms, clips, sets up and bins all triangles.
-fn bin_scene<'a>(scene: &'a Scene, view: &View, memory: &mut Memory) -> Result<Binned<'a>, Error> {
+fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memory) -> Result<Binned<'a>, Error> {
     let start = Instant::now();
     let draws = draws(scene, view)?;
     let viewport = Viewport::of(view);
@@ -155,7 +165,7 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, memory: &mut Memory) -> Result<B
     stats.dropped_triangles = chunks.iter().map(|chunk| chunk.dropped_triangles).sum();
     stats.steps =
         vec![Step { name: "transform", ms: transform_ms }, Step { name: "clip, setup and bin", ms: setup_ms }];
-    Ok(Binned { draws, grid, chunks, stats, start })
+    Ok(Binned { draws, grid, chunks, level, stats, start })
 }
 
 /// Captures every tile and hands it to `resolve`, on all threads, the dearest tiles first. Returns the figures of all and
@@ -181,7 +191,7 @@ fn for_each_tile(
         let mut layers = Layers::default();
         let mut counts = FragmentCounts::default();
         while let Some(&tile) = tiles.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed)) {
-            counts = counts.merged(capture.capture(tile, &binned.chunks, &binned.draws, &binned.grid));
+            counts = counts.merged(capture.capture(tile, binned.parts()));
             resolve(tile, &capture, &mut layers);
         }
         let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
@@ -208,6 +218,10 @@ fn tile_rows<'i>(image: &'i mut Image, grid: &TileGrid) -> Vec<Vec<&'i mut [Vec4
 }
 
 impl Binned<'_> {
+    fn parts(&self) -> FrameParts<'_> {
+        FrameParts { chunks: &self.chunks, draws: &self.draws, grid: &self.grid, level: self.level }
+    }
+
     /// Completes the figures and gives the memory back.
     fn finish(&mut self, counts: FragmentCounts, capture_bytes: usize, memory: &mut Memory, scene: &Scene) -> Stats {
         debug_assert_eq!(self.stats.triangles, u64::from(scene.primitive_count()));

@@ -1,16 +1,17 @@
 //! One tile: opaque surfaces through a depth buffer, then transparent ones captured, ordered and resolved.
 
+use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use pellucid_core::composite::Composite;
 use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::pixel_grid::ScreenTriangle;
 use pellucid_core::primitive::Draw;
-use pellucid_core::shading::Surface;
+use pellucid_core::shading::{NormalPlane, Varying, color_at};
 use pellucid_core::{Fragment, Layers};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
-use crate::raster::rasterize;
+use crate::raster::{Coverage, Depths, cover};
 use crate::setup::{Chunk, Record};
 
 /// Samples of a tile.
@@ -26,10 +27,11 @@ const NONE: u32 = u32::MAX;
 #[derive(Debug)]
 pub(crate) struct TileCapture {
     rect: PixelRect,
-    surfaces: Vec<TileSurface>,
+    surfaces: Surfaces,
     /// Nearest opaque surface: order key so far, and its place in `surfaces`.
     opaque_keys: Vec<u64>,
     opaque_surfaces: Vec<u32>,
+    has_opaque: bool,
     /// Transparent fragments in draw order: sample, and depth above place in `surfaces`. As surfaces stand in draw order,
     /// this orders like the contract's order key.
     samples: Vec<u16>,
@@ -39,12 +41,23 @@ pub(crate) struct TileCapture {
     ends: Vec<u32>,
 }
 
-/// A piece of a primitive with a fragment in the tile.
-#[derive(Debug)]
-struct TileSurface {
+/// The pieces of primitives with a fragment in the tile.
+#[derive(Debug, Default)]
+struct Surfaces {
+    surfaces: Vec<Surface>,
+    varying: Vec<Varying>,
+}
+
+/// What it takes to shade a piece: one cache line.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    normal: NormalPlane,
+    /// The piece's anchor: within the guard band, so that 16 bits hold it.
+    anchor_px: [i16; 2],
     draw: u32,
     primitive: u32,
-    surface: Surface,
+    /// Place in the table of varying colours, or [`NONE`].
+    varying: u32,
 }
 
 /// Fragments of a tile, or of many.
@@ -65,13 +78,55 @@ impl FragmentCounts {
     }
 }
 
+impl Surfaces {
+    /// Adds the piece of a record; returns its place.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        chunk: &Chunk,
+        record: &Record,
+        triangle: &ScreenTriangle,
+        weights: [pellucid_core::pixel_grid::Plane; 2],
+        draw: &Draw<'_>,
+    ) -> u32 {
+        let piece = chunk.piece(record, *triangle);
+        let number = record.triangle as usize;
+        let varying = if draw.varies() {
+            self.varying.push(Varying::new(draw, number, &piece, weights));
+            self.varying.len() as u32 - 1
+        } else {
+            NONE
+        };
+        let [x, y] = triangle.anchor_px();
+        self.surfaces.push(Surface {
+            normal: NormalPlane::new(draw, number, &piece, weights),
+            anchor_px: [x as i16, y as i16],
+            draw: record.draw,
+            primitive: draw.first_primitive + record.triangle,
+            varying,
+        });
+        self.surfaces.len() as u32 - 1
+    }
+
+    /// The colour of the surface at a place, at a pixel.
+    #[inline(always)]
+    fn color(&self, place: u32, x: i32, y: i32, draws: &[Draw<'_>]) -> Option<Vec4> {
+        let surface = &self.surfaces[place as usize];
+        let [anchor_x, anchor_y] = surface.anchor_px;
+        let (x, y) = (x - i32::from(anchor_x), y - i32::from(anchor_y));
+        let varying = if surface.varying == NONE { None } else { self.varying.get(surface.varying as usize) };
+        color_at(&draws[surface.draw as usize], &surface.normal, varying, x, y)
+    }
+}
+
 impl Default for TileCapture {
     fn default() -> Self {
         Self {
             rect: PixelRect { left: 0, top: 0, right: 0, bottom: 0 },
-            surfaces: Vec::new(),
+            surfaces: Surfaces::default(),
             opaque_keys: vec![0; TILE_SAMPLES],
             opaque_surfaces: vec![NONE; TILE_SAMPLES],
+            has_opaque: false,
             samples: Vec::new(),
             keys: Vec::new(),
             sorted_keys: Vec::new(),
@@ -80,83 +135,140 @@ impl Default for TileCapture {
     }
 }
 
+/// Everything a frame knows that a tile needs.
+#[derive(Clone, Copy)]
+pub(crate) struct FrameParts<'a> {
+    pub(crate) chunks: &'a [Chunk],
+    pub(crate) draws: &'a [Draw<'a>],
+    pub(crate) grid: &'a TileGrid,
+    pub(crate) level: Level,
+}
+
 impl TileCapture {
     /// Captures a tile and orders its fragments.
-    pub(crate) fn capture(
-        &mut self,
-        number: u32,
-        chunks: &[Chunk],
-        draws: &[Draw<'_>],
-        grid: &TileGrid,
-    ) -> FragmentCounts {
-        self.rect = grid.tile(number);
-        self.surfaces.clear();
+    pub(crate) fn capture(&mut self, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
+        dispatch!(frame.level, simd => self.capture_simd(simd, number, frame))
+    }
+
+    #[inline(always)]
+    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
+        self.rect = frame.grid.tile(number);
+        self.surfaces.surfaces.clear();
+        self.surfaces.varying.clear();
         self.samples.clear();
         self.keys.clear();
-        self.opaque_keys.fill(0);
-        self.opaque_surfaces.fill(NONE);
-        for chunk in chunks {
+        if self.has_opaque {
+            self.opaque_keys.fill(0);
+            self.opaque_surfaces.fill(NONE);
+            self.has_opaque = false;
+        }
+        let mut coverage = Coverage { top: 0, bottom: 0, rows: [0; TILE_PX as usize] };
+        for chunk in frame.chunks {
             for &record in chunk.opaque.tile(number) {
-                self.add_opaque(chunk, chunk.record(record), draws, grid);
+                self.has_opaque = true;
+                self.add_opaque(simd, chunk, chunk.record(record), frame, &mut coverage);
             }
         }
-        // Opaque surfaces may stand anywhere in draw order; those of transparent ones start after them.
-        for chunk in chunks {
+        for chunk in frame.chunks {
             for &record in chunk.transparent.tile(number) {
-                self.add_transparent(chunk, chunk.record(record), draws, grid);
+                self.add_transparent(simd, chunk, chunk.record(record), frame, &mut coverage);
             }
         }
         self.order()
     }
 
-    fn add_opaque(&mut self, chunk: &Chunk, record: &Record, draws: &[Draw<'_>], grid: &TileGrid) {
+    #[inline(always)]
+    fn add_opaque<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &Chunk,
+        record: &Record,
+        frame: FrameParts<'_>,
+        coverage: &mut Coverage,
+    ) {
         let Some(triangle) = ScreenTriangle::new(record.vertices) else { return };
-        let Some(samples) = grid.samples_in_bounds(&record.vertices) else { return };
-        let draw = &draws[record.draw as usize];
+        let Some(samples) = frame.grid.samples_in_bounds(&record.vertices) else { return };
+        if !cover(simd, &triangle, samples, self.rect, coverage) {
+            return;
+        }
+        let draw = &frame.draws[record.draw as usize];
         let primitive = draw.first_primitive + record.triangle;
+        let weights = triangle.weight_planes();
+        let depths = Depths::new(&triangle, weights, self.rect);
         let mut place = NONE;
-        rasterize(&triangle, samples, self.rect, |sample, x, y, depth| {
-            let key = order_key(depth, primitive);
-            if key < self.opaque_keys[sample] {
-                return;
+        for y in coverage.top..=coverage.bottom {
+            let mut mask = coverage.rows[y];
+            let row = depths.row(y);
+            while mask != 0 {
+                let x = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let sample = y * TILE_PX as usize + x;
+                let key = order_key(depths.at(row, x), primitive);
+                if key < self.opaque_keys[sample] {
+                    continue;
+                }
+                if place == NONE {
+                    place = self.surfaces.add(chunk, record, &triangle, weights, draw);
+                }
+                let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
+                if draw.cutoff.is_none() || self.surfaces.color(place, x, y, frame.draws).is_some() {
+                    self.opaque_keys[sample] = key;
+                    self.opaque_surfaces[sample] = place;
+                }
             }
-            if place == NONE {
-                place = add_surface(&mut self.surfaces, chunk, record, triangle, draw, primitive);
-            }
-            let surface = &self.surfaces[place as usize].surface;
-            if draw.cutoff.is_none() || surface.color(draw, x, y).is_some() {
-                self.opaque_keys[sample] = key;
-                self.opaque_surfaces[sample] = place;
-            }
-        });
+        }
     }
 
-    fn add_transparent(&mut self, chunk: &Chunk, record: &Record, draws: &[Draw<'_>], grid: &TileGrid) {
+    #[inline(always)]
+    fn add_transparent<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &Chunk,
+        record: &Record,
+        frame: FrameParts<'_>,
+        coverage: &mut Coverage,
+    ) {
         let Some(triangle) = ScreenTriangle::new(record.vertices) else { return };
-        let Some(samples) = grid.samples_in_bounds(&record.vertices) else { return };
-        let draw = &draws[record.draw as usize];
-        let mut place = NONE;
-        rasterize(&triangle, samples, self.rect, |sample, x, y, depth| {
-            // In front of the opaque surface, or level with it.
-            if depth.to_bits() < (self.opaque_keys[sample] >> 32) as u32 {
-                return;
+        let Some(samples) = frame.grid.samples_in_bounds(&record.vertices) else { return };
+        if !cover(simd, &triangle, samples, self.rect, coverage) {
+            return;
+        }
+        let draw = &frame.draws[record.draw as usize];
+        let weights = triangle.weight_planes();
+        let depths = Depths::new(&triangle, weights, self.rect);
+        let place = self.surfaces.add(chunk, record, &triangle, weights, draw);
+        for y in coverage.top..=coverage.bottom {
+            let mut mask = coverage.rows[y];
+            let row = depths.row(y);
+            while mask != 0 {
+                let x = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let sample = y * TILE_PX as usize + x;
+                let depth = depths.at(row, x);
+                // In front of the opaque surface, or level with it.
+                if depth.to_bits() < (self.opaque_keys[sample] >> 32) as u32 {
+                    continue;
+                }
+                if draw.cutoff.is_some() {
+                    let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
+                    if self.surfaces.color(place, x, y, frame.draws).is_none() {
+                        continue;
+                    }
+                }
+                self.samples.push(sample as u16);
+                self.keys.push(order_key(depth, place));
             }
-            if place == NONE {
-                let primitive = draw.first_primitive + record.triangle;
-                place = add_surface(&mut self.surfaces, chunk, record, triangle, draw, primitive);
-            }
-            if draw.cutoff.is_some() && self.surfaces[place as usize].surface.color(draw, x, y).is_none() {
-                return;
-            }
-            self.samples.push(sample as u16);
-            self.keys.push(order_key(depth, place));
-        });
+        }
     }
 
     /// Brings the fragments of each sample together, nearest first.
+    #[inline(always)]
     fn order(&mut self) -> FragmentCounts {
         let mut counts = FragmentCounts { fragments: self.keys.len() as u64, ..FragmentCounts::default() };
         self.ends.fill(0);
+        if self.keys.is_empty() {
+            return counts;
+        }
         for &sample in &self.samples {
             self.ends[sample as usize] += 1;
         }
@@ -168,7 +280,9 @@ impl TileCapture {
             *place = start;
             start += count;
         }
-        self.sorted_keys.resize(self.keys.len(), 0);
+        if self.sorted_keys.len() < self.keys.len() {
+            self.sorted_keys.resize(self.keys.len(), 0);
+        }
         // Starts become ends while the fragments are put down.
         for (&sample, &key) in self.samples.iter().zip(&self.keys) {
             let place = &mut self.ends[sample as usize];
@@ -192,42 +306,51 @@ impl TileCapture {
         })
     }
 
+    #[inline(always)]
     fn keys_of(&self, sample: usize) -> &[u64] {
         let start = if sample == 0 { 0 } else { self.ends[sample - 1] as usize };
         &self.sorted_keys[start..self.ends[sample] as usize]
     }
 
+    #[inline(always)]
     fn opaque_surface(&self, sample: usize, x: i32, y: i32, draws: &[Draw<'_>]) -> Option<OpaqueSurface> {
         let place = self.opaque_surfaces[sample];
         if place == NONE {
             return None;
         }
-        let TileSurface { draw, surface, .. } = &self.surfaces[place as usize];
-        let color = surface.color(&draws[*draw as usize], x, y)?;
+        let color = self.surfaces.color(place, x, y, draws)?;
         Some(OpaqueSurface { color, depth: f32::from_bits((self.opaque_keys[sample] >> 32) as u32) })
     }
 
-    fn fragment(&self, key: u64, x: i32, y: i32, draws: &[Draw<'_>]) -> Option<Fragment> {
-        let TileSurface { draw, primitive, surface } = &self.surfaces[key as u32 as usize];
-        let color = surface.color(&draws[*draw as usize], x, y)?;
-        Some(Fragment { color, depth: f32::from_bits((key >> 32) as u32), primitive: *primitive })
+    /// Blends every pixel front to back before `background` into rows of pixels.
+    pub(crate) fn blend(&self, frame: FrameParts<'_>, background: Vec4, rows: &mut [&mut [Vec4]]) {
+        if self.keys.is_empty() && !self.has_opaque {
+            for row in rows {
+                row.fill(background);
+            }
+            return;
+        }
+        dispatch!(frame.level, _simd => self.blend_simd(frame.draws, background, rows));
     }
 
-    /// Blends every pixel front to back before `background` into rows of pixels.
-    pub(crate) fn blend(&self, draws: &[Draw<'_>], background: Vec4, rows: &mut [&mut [Vec4]]) {
-        for (sample, x, y) in self.pixels() {
-            let mut composite = Composite::default();
-            for &key in self.keys_of(sample) {
-                if let Some(fragment) = self.fragment(key, x, y, draws) {
-                    composite.under(fragment.color);
+    #[inline(always)]
+    fn blend_simd(&self, draws: &[Draw<'_>], background: Vec4, rows: &mut [&mut [Vec4]]) {
+        for (row, y) in rows.iter_mut().zip(self.rect.top..) {
+            let first = (y - self.rect.top) as usize * TILE_PX as usize;
+            for ((pixel, x), sample) in row.iter_mut().zip(self.rect.left..).zip(first..) {
+                let mut composite = Composite::default();
+                for &key in self.keys_of(sample) {
+                    if let Some(color) = self.surfaces.color(key as u32, x, y, draws) {
+                        composite.under(color);
+                    }
+                    // Exactly 0: nothing behind changes a bit.
+                    if composite.transmittance == 0.0 {
+                        break;
+                    }
                 }
-                // Exactly 0: nothing behind changes a bit.
-                if composite.transmittance == 0.0 {
-                    break;
-                }
+                let behind = self.opaque_surface(sample, x, y, draws).map_or(background, |surface| surface.color);
+                *pixel = composite.over(behind);
             }
-            let behind = self.opaque_surface(sample, x, y, draws).map_or(background, |surface| surface.color);
-            rows[(y - self.rect.top) as usize][(x - self.rect.left) as usize] = composite.over(behind);
         }
     }
 
@@ -241,7 +364,12 @@ impl TileCapture {
         layers.fragments.clear();
         layers.opaque.clear();
         for (sample, x, y) in self.pixels() {
-            layers.fragments.extend(self.keys_of(sample).iter().filter_map(|&key| self.fragment(key, x, y, draws)));
+            layers.fragments.extend(self.keys_of(sample).iter().filter_map(|&key| {
+                let place = key as u32;
+                let color = self.surfaces.color(place, x, y, draws)?;
+                let primitive = self.surfaces.surfaces[place as usize].primitive;
+                Some(Fragment { color, depth: f32::from_bits((key >> 32) as u32), primitive })
+            }));
             layers.ends.push(layers.fragments.len() as u32);
             layers.opaque.push(self.opaque_surface(sample, x, y, draws));
         }
@@ -249,26 +377,15 @@ impl TileCapture {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.surfaces.capacity() * size_of::<TileSurface>()
+        self.surfaces.surfaces.capacity() * size_of::<Surface>()
+            + self.surfaces.varying.capacity() * size_of::<Varying>()
             + (self.opaque_keys.capacity() + self.keys.capacity() + self.sorted_keys.capacity()) * 8
             + (self.opaque_surfaces.capacity() + self.ends.capacity()) * 4
             + self.samples.capacity() * 2
     }
 }
 
-fn add_surface(
-    surfaces: &mut Vec<TileSurface>,
-    chunk: &Chunk,
-    record: &Record,
-    triangle: ScreenTriangle,
-    draw: &Draw<'_>,
-    primitive: u32,
-) -> u32 {
-    let surface = Surface::new(draw, record.triangle as usize, &chunk.piece(record, triangle));
-    surfaces.push(TileSurface { draw: record.draw, primitive, surface });
-    (surfaces.len() - 1) as u32
-}
-
+#[inline(always)]
 fn sort_descending(keys: &mut [u64]) {
     if keys.len() > INSERTION_SORT_MAX {
         keys.sort_unstable_by(|a, b| b.cmp(a));
