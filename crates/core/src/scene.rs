@@ -4,6 +4,8 @@
 //! Vertex positions may still be NaN or infinite, as files hold such things; primitives that touch them are dropped and
 //! counted by the renderers.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::shading::GREATEST_COLOR;
@@ -242,6 +244,7 @@ pub struct Scene {
     instances: Vec<Instance>,
     cameras: Vec<Camera>,
     primitive_count: u32,
+    revision: u64,
 }
 
 /// Coordinates beyond it do not count for a scene's bounds. Squares of sums of them are still finite.
@@ -267,6 +270,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Scene`] for more than 2^32 of them.
     pub fn add_texture(&mut self, texture: Texture) -> Result<TextureId, Error> {
+        self.change();
         let id = TextureId(next_id("textures", self.textures.len())?);
         self.textures.push(texture);
         Ok(id)
@@ -290,6 +294,7 @@ impl Scene {
         {
             return Err(Error::Scene(format!("material '{}' names a texture that is not there", material.name)));
         }
+        self.change();
         let id = MaterialId(next_id("materials", self.materials.len())?);
         self.materials.push(material);
         Ok(id)
@@ -300,6 +305,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Scene`] for more than 2^32 of them.
     pub fn add_mesh(&mut self, mesh: Mesh) -> Result<MeshId, Error> {
+        self.change();
         let id = MeshId(next_id("meshes", self.meshes.len())?);
         self.meshes.push(mesh);
         Ok(id)
@@ -321,12 +327,19 @@ impl Scene {
             Error::Scene(format!("{total} triangles after instancing; at most 2^32 - 1 can be numbered"))
         })?;
         self.instances.push(instance);
+        self.change();
         Ok(())
     }
 
     /// Adds a camera that the file brought along; the first is used unless the user names another view.
     pub fn add_camera(&mut self, camera: Camera) {
         self.cameras.push(camera);
+        self.change();
+    }
+
+    fn change(&mut self) {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        self.revision = NEXT.fetch_add(1, Ordering::Relaxed);
     }
 
     /// All meshes.
@@ -367,6 +380,12 @@ impl Scene {
     /// The texture of an id.
     pub fn texture(&self, id: TextureId) -> &Texture {
         &self.textures[id.index()]
+    }
+
+    /// Changes whenever the scene does, and differs between scenes that were made apart: what a renderer keeps of a
+    /// scene is still good while this number is the same.
+    pub fn revision(&self) -> u64 {
+        self.revision
     }
 
     /// Triangles after instancing.
