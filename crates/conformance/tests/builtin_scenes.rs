@@ -68,8 +68,8 @@ fn bits_do_not_depend_on_threads_or_repetition() {
 #[test]
 fn cameras_anywhere_are_right() {
     let renderer = Renderer::new();
-    for name in ["boxes", "planes", "cyclic", "grids", "glass"] {
-        let scene = pellucid::load(&small(name)).unwrap().scene;
+    for source in ["@boxes:n=3", "@planes:n=6", "@cyclic", "@grids:layers=4,tessellation=4", "@blocks:n=12"] {
+        let scene = pellucid::load(source).unwrap().scene;
         let sphere = scene.bounding_sphere();
         let fitted = Camera::fitted(sphere, Vec3::Z, 1.0, 1.0);
         for (azimuth, elevation) in [(0.0, 0.0), (90.0, 0.0), (45.0, 90.0), (200.0, -35.0)] {
@@ -82,7 +82,7 @@ fn cameras_anywhere_are_right() {
                     let capture = oracle::capture(&scene, &view).unwrap();
                     let gathered = layers::gather(&renderer, &scene, &view).unwrap();
                     if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
-                        panic!("{name}, eye {eye}, target {target}: {difference}");
+                        panic!("{source}, eye {eye}, target {target}: {difference}");
                     }
                     let frame = renderer.render(&scene, &view, Resolve::Blend).unwrap();
                     assert!(frame.image.pixels().iter().all(|pixel| pixel.is_finite()));

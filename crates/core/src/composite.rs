@@ -20,14 +20,14 @@ impl Default for Composite {
 
 impl Composite {
     /// Puts a layer, premultiplied, behind those so far.
-    #[inline]
+    #[inline(always)]
     pub fn under(&mut self, layer: Vec4) {
         self.color += layer.truncate() * self.transmittance;
         self.transmittance *= 1.0 - layer.w;
     }
 
     /// The pixel that results with `behind`, premultiplied, behind everything.
-    #[inline]
+    #[inline(always)]
     pub fn over(self, behind: Vec4) -> Vec4 {
         let color = self.color + behind.truncate() * self.transmittance;
         color.extend((1.0 - self.transmittance) + behind.w * self.transmittance)

@@ -10,7 +10,7 @@ use crate::layers::OpaqueSurface;
 use crate::pixel_grid::{Viewport, depth_at};
 use crate::primitive::{Draw, NotFinite, Pass, Piece, draws};
 use crate::resolve::{PixelResolver, finish};
-use crate::shading::{NormalPlane, Varying, color_at};
+use crate::shading::{CornerNormals, NormalPlane, Varying, color_at};
 use crate::stats::Step;
 use crate::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View, fragment};
 
@@ -85,7 +85,8 @@ fn rasterize(
 ) {
     let weights = piece.triangle.weight_planes();
     let depth_plane = piece.triangle.depth_plane(weights);
-    let normal = NormalPlane::new(draw, triangle, piece, weights);
+    let normals = CornerNormals::new(draw, triangle, &piece.triangle.vertices, &piece.corners);
+    let normal = NormalPlane::new(&normals, weights);
     let varying = draw.varies().then(|| Varying::new(draw, triangle, piece, weights));
     let [anchor_x, anchor_y] = piece.triangle.anchor_px();
     for y in 0..view.height as i32 {

@@ -76,7 +76,7 @@ impl Viewport {
     }
 
     /// Beyond which planes a clip-space position lies; 0 if it can be projected as it is.
-    #[inline]
+    #[inline(always)]
     pub fn outcode(&self, clip: Vec4) -> u8 {
         let [guard_x, guard_y] = self.guard();
         let (x, y) = (guard_x * clip.w, guard_y * clip.w);
@@ -91,7 +91,7 @@ impl Viewport {
     }
 
     /// Divides by w and snaps to the grid. The position must lie inside all planes of [`Self::outcode`].
-    #[inline]
+    #[inline(always)]
     pub fn project(&self, clip: Vec4) -> ScreenVertex {
         let inv_w = 1.0 / clip.w;
         // Rounding may lead a little over the guard band, and 1 / w may be infinite.
@@ -106,7 +106,7 @@ impl Viewport {
 }
 
 /// The subpixel coordinate of a pixel's centre, along one axis.
-#[inline]
+#[inline(always)]
 pub fn center(px: i32) -> i32 {
     px * SUBPIXELS + SUBPIXELS / 2
 }
@@ -138,13 +138,13 @@ impl Edge {
     }
 
     /// Value at a position in subpixels.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, x: i32, y: i32) -> i64 {
         self.a * i64::from(x) + self.b * i64::from(y) + self.c
     }
 
     /// Value at a position, less 1 if the line itself is not inside: inside exactly where it is not negative.
-    #[inline]
+    #[inline(always)]
     pub fn biased_at(&self, x: i32, y: i32) -> i64 {
         self.at(x, y) - i64::from(!self.owns_line)
     }
@@ -164,7 +164,7 @@ pub struct Plane {
 
 impl Plane {
     /// Value `x` pixels to the right of the anchor and `y` below it.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, x: i32, y: i32) -> f64 {
         (self.value + f64::from(y) * self.dy) + f64::from(x) * self.dx
     }
@@ -182,7 +182,7 @@ pub struct ScreenTriangle {
 }
 
 /// Twice the signed area in square subpixels: positive if the corners run clockwise on the screen.
-#[inline]
+#[inline(always)]
 pub fn twice_signed_area([a, b, c]: [ScreenVertex; 3]) -> i64 {
     (i64::from(b.x) - i64::from(a.x)) * (i64::from(c.y) - i64::from(a.y))
         - (i64::from(c.x) - i64::from(a.x)) * (i64::from(b.y) - i64::from(a.y))
@@ -216,13 +216,13 @@ impl ScreenTriangle {
     }
 
     /// The pixel that its planes are anchored at: the one with the first corner in it.
-    #[inline]
+    #[inline(always)]
     pub fn anchor_px(&self) -> [i32; 2] {
         [self.vertices[0].x.div_euclid(SUBPIXELS), self.vertices[0].y.div_euclid(SUBPIXELS)]
     }
 
     /// The planes of the second and third corner's barycentric weight (screen space, not perspective-correct).
-    #[inline]
+    #[inline(always)]
     pub fn weight_planes(&self) -> [Plane; 2] {
         let [x, y] = self.anchor_px().map(center);
         let inv_area = 1.0 / self.twice_area as f64;
@@ -236,7 +236,7 @@ impl ScreenTriangle {
 
     /// The plane of depth, given [`Self::weight_planes`]. Rounded to f32 and clamped to [`Self::depth_range`] it is a
     /// fragment's depth.
-    #[inline]
+    #[inline(always)]
     pub fn depth_plane(&self, [second, third]: [Plane; 2]) -> Plane {
         let [z0, z1, z2] = self.vertices.map(|v| f64::from(v.depth));
         let (dz1, dz2) = (z1 - z0, z2 - z0);
@@ -248,7 +248,7 @@ impl ScreenTriangle {
     }
 
     /// Least and greatest depth of the corners. Clamping to it keeps slivers, whose planes are steep, in place.
-    #[inline]
+    #[inline(always)]
     pub fn depth_range(&self) -> [f32; 2] {
         let [a, b, c] = self.vertices.map(|v| v.depth);
         [a.min(b).min(c), a.max(b).max(c)]
@@ -256,7 +256,7 @@ impl ScreenTriangle {
 }
 
 /// A fragment's depth: a plane's value rounded to f32, inside the range of its triangle.
-#[inline]
+#[inline(always)]
 pub fn depth_at(plane: &Plane, [least, greatest]: [f32; 2], x_from_anchor: i32, y_from_anchor: i32) -> f32 {
     (plane.at(x_from_anchor, y_from_anchor) as f32).clamp(least, greatest)
 }

@@ -123,7 +123,7 @@ fn view_from_normal(view_from_mesh: &DMat4) -> Mat3A {
 }
 
 /// A point as clip coordinates, in the order of operations that every renderer keeps.
-#[inline]
+#[inline(always)]
 pub fn transform_point(matrix: &Mat4, point: Vec3) -> Vec4 {
     ((matrix.x_axis * point.x + matrix.y_axis * point.y) + matrix.z_axis * point.z) + matrix.w_axis
 }
@@ -142,7 +142,7 @@ pub enum Corners {
 
 impl Corners {
     /// A vertex attribute at the piece's corners from the primitive's.
-    #[inline]
+    #[inline(always)]
     pub fn attribute<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
         match self {
             Self::Whole { swapped: false } => [a, b, c],
@@ -191,7 +191,7 @@ impl Draw<'_> {
     }
 
     /// The piece of a triangle that needs no clipping.
-    #[inline]
+    #[inline(always)]
     pub fn whole_piece(&self, mut corners: [ScreenVertex; 3]) -> Option<Piece> {
         let area = twice_signed_area(corners);
         if !self.shows_side(area) {
@@ -229,7 +229,7 @@ impl Draw<'_> {
 
     /// Whether the side that a triangle of this signed area (clockwise on the screen positive) turns to the camera is
     /// drawn.
-    #[inline]
+    #[inline(always)]
     pub fn shows_side(&self, twice_signed_area: i64) -> bool {
         let front = (twice_signed_area < 0) != self.mirrored;
         front || !self.culls_back_faces

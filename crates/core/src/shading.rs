@@ -5,10 +5,10 @@
 //! length, so it is left out. Every surface is lit by a [`NormalPlane`]: a flat one's does not change over the screen, an
 //! unlit one's faces the camera. Where colour varies too, [`Varying`] holds its parts.
 
-use glam::{Vec2, Vec3A, Vec4};
+use glam::{Vec2, Vec3, Vec3A, Vec4};
 
-use crate::pixel_grid::Plane;
-use crate::primitive::{Draw, Piece};
+use crate::pixel_grid::{Plane, ScreenVertex};
+use crate::primitive::{Corners, Draw, Piece};
 
 /// Share of the light that comes from everywhere.
 pub const AMBIENT: f32 = 0.25;
@@ -37,13 +37,15 @@ pub struct NormalPlane {
     pub dy: Vec3A,
 }
 
-impl NormalPlane {
-    /// The normals of a piece of one triangle of a draw's mesh, whose [`weight_planes`] are given.
-    ///
-    /// [`weight_planes`]: crate::pixel_grid::ScreenTriangle::weight_planes
+/// The camera-space normal over w at a piece's first corner, and how much those at the other two differ from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerNormals(pub [Vec3; 3]);
+
+impl CornerNormals {
+    /// The normals of a piece of one triangle of a draw's mesh.
     #[inline(always)]
-    pub fn new(draw: &Draw<'_>, triangle: usize, piece: &Piece, weights: [Plane; 2]) -> Self {
-        let constant = |value| Self { value, dx: Vec3A::ZERO, dy: Vec3A::ZERO };
+    pub fn new(draw: &Draw<'_>, triangle: usize, vertices: &[ScreenVertex; 3], corners: &Corners) -> Self {
+        let constant = |value: Vec3A| Self([value.into(), Vec3::ZERO, Vec3::ZERO]);
         if !draw.lit {
             return constant(Vec3A::Z);
         }
@@ -55,11 +57,20 @@ impl NormalPlane {
             return constant(draw.view_from_normal * Vec3A::from((b - a).cross(c - a)));
         };
         let corner = |vertex: usize| draw.view_from_normal * Vec3A::from(normals[vertex]);
-        let [a, b, c] = piece.corners.attribute([corner(i), corner(j), corner(k)]);
-        let [va, vb, vc] = &piece.triangle.vertices;
-        let a = a * va.inv_w;
-        let (to_b, to_c) = (b * vb.inv_w - a, c * vc.inv_w - a);
-        let [second, third] = weights;
+        let [a, b, c] = corners.attribute([corner(i), corner(j), corner(k)]);
+        let a = a * vertices[0].inv_w;
+        let (to_b, to_c) = (b * vertices[1].inv_w - a, c * vertices[2].inv_w - a);
+        Self([a.into(), to_b.into(), to_c.into()])
+    }
+}
+
+impl NormalPlane {
+    /// From a piece's normals and its [`weight_planes`].
+    ///
+    /// [`weight_planes`]: crate::pixel_grid::ScreenTriangle::weight_planes
+    #[inline(always)]
+    pub fn new(normals: &CornerNormals, [second, third]: [Plane; 2]) -> Self {
+        let [a, to_b, to_c] = normals.0.map(Vec3A::from);
         Self {
             value: a + (to_b * second.value as f32 + to_c * third.value as f32),
             dx: to_b * second.dx as f32 + to_c * third.dx as f32,
@@ -189,8 +200,6 @@ where
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
 
     #[test]

@@ -50,7 +50,7 @@ impl Technique {
     /// Bytes it holds besides scene and picture, as a formula.
     pub fn memory_formula(self) -> &'static str {
         match self {
-            Self::Cpu => "17 B x vertices + 60 B x visible triangles + threads x fragments of a tile x 24 B",
+            Self::Cpu => "16 B x vertices + 96 B x visible triangles + threads x fragments of a tile x 24 B",
             Self::Oracle => "24 B x fragments",
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch};
 use glam::Vec4;
 use pellucid_core::pixel_grid::{ScreenVertex, Viewport};
 use pellucid_core::primitive::{Draw, draws};
@@ -142,7 +142,7 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
     for group in groups(&draws) {
         let transform_start = Instant::now();
         let group_draws = &draws[group.draws.clone()];
-        transform(group_draws, &viewport, &mut memory.vertices, &mut memory.vertex_starts);
+        transform(group_draws, &viewport, level, &mut memory.vertices, &mut memory.vertex_starts);
         let setup_start = Instant::now();
         let spans = chunk_spans(group_draws, group.draws.start);
         if chunks.len() < used + spans.len() {
@@ -151,7 +151,7 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
         let (vertices, starts) = (&memory.vertices, &memory.vertex_starts);
         chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
             let screen_vertices = |draw: usize| &vertices[starts[draw - group.draws.start]..];
-            chunk.fill(spans, &draws, screen_vertices, &viewport, &grid);
+            dispatch!(level, _simd => chunk.fill(spans, &draws, screen_vertices, &viewport, &grid));
         });
         used += spans.len();
         transform_ms += (setup_start - transform_start).as_secs_f64() * 1e3;

@@ -2,6 +2,7 @@
 
 use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, outcode, twice_signed_area};
 use pellucid_core::primitive::{Corners, Draw, Pass, Piece};
+use pellucid_core::shading::CornerNormals;
 
 use crate::bin::{Bins, TileGrid};
 use crate::transform;
@@ -15,6 +16,8 @@ pub(crate) struct Record {
     pub(crate) draw: u32,
     /// Number of the triangle in the draw's mesh.
     pub(crate) triangle: u32,
+    /// Kept here although the mesh has them: tiles visit triangles in an order that no cache follows.
+    pub(crate) normals: CornerNormals,
     corners: RecordCorners,
 }
 
@@ -78,6 +81,7 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span
 
 impl Chunk {
     /// Sets up the triangles of `spans`; `screen_vertices` gives the transformed vertices of a draw.
+    #[inline(always)]
     pub(crate) fn fill<'v>(
         &mut self,
         spans: &[Span],
@@ -98,6 +102,7 @@ impl Chunk {
         self.transparent.finish(grid);
     }
 
+    #[inline(always)]
     fn set_up(
         &mut self,
         span: &Span,
@@ -155,7 +160,7 @@ impl Chunk {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn push(
         &mut self,
         draw_number: usize,
@@ -174,7 +179,8 @@ impl Chunk {
             Pass::Transparent => &mut self.transparent,
         };
         bins.add(self.records.len() as u32, &vertices, samples, grid);
-        self.records.push(Record { vertices, draw: draw_number as u32, triangle: triangle as u32, corners });
+        let normals = CornerNormals::new(draw, triangle, &vertices, &self.corners(corners));
+        self.records.push(Record { vertices, draw: draw_number as u32, triangle: triangle as u32, normals, corners });
     }
 
     /// The record of a number.
@@ -184,13 +190,18 @@ impl Chunk {
     }
 
     /// The piece that a record stands for.
+    #[inline(always)]
     pub(crate) fn piece(&self, record: &Record, triangle: ScreenTriangle) -> Piece {
-        let corners = match record.corners {
+        Piece { triangle, corners: self.corners(record.corners) }
+    }
+
+    #[inline(always)]
+    fn corners(&self, corners: RecordCorners) -> Corners {
+        match corners {
             RecordCorners::Whole => Corners::Whole { swapped: false },
             RecordCorners::Swapped => Corners::Whole { swapped: true },
             RecordCorners::Clipped(number) => Corners::Clipped(self.clipped[number as usize]),
-        };
-        Piece { triangle, corners }
+        }
     }
 
     /// Bytes held.
@@ -203,7 +214,7 @@ impl Chunk {
 }
 
 /// Whether a triangle covers one pixel.
-#[inline]
+#[inline(always)]
 fn covers(vertices: &[ScreenVertex; 3], x: i32, y: i32) -> bool {
     ScreenTriangle::new(*vertices).is_some_and(|triangle| triangle.covers(x, y))
 }

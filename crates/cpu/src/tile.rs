@@ -89,17 +89,16 @@ impl Surfaces {
         weights: [pellucid_core::pixel_grid::Plane; 2],
         draw: &Draw<'_>,
     ) -> u32 {
-        let piece = chunk.piece(record, *triangle);
-        let number = record.triangle as usize;
         let varying = if draw.varies() {
-            self.varying.push(Varying::new(draw, number, &piece, weights));
+            let piece = chunk.piece(record, *triangle);
+            self.varying.push(Varying::new(draw, record.triangle as usize, &piece, weights));
             self.varying.len() as u32 - 1
         } else {
             NONE
         };
         let [x, y] = triangle.anchor_px();
         self.surfaces.push(Surface {
-            normal: NormalPlane::new(draw, number, &piece, weights),
+            normal: NormalPlane::new(&record.normals, weights),
             anchor_px: [x as i16, y as i16],
             draw: record.draw,
             primitive: draw.first_primitive + record.triangle,

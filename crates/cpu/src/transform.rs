@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, dispatch};
 use pellucid_core::pixel_grid::{ScreenVertex, Viewport};
 use pellucid_core::primitive::{Draw, transform_point};
 use rayon::prelude::*;
@@ -48,6 +49,7 @@ pub(crate) fn groups(draws: &[Draw<'_>]) -> Vec<Group> {
 pub(crate) fn transform(
     draws: &[Draw<'_>],
     viewport: &Viewport,
+    level: Level,
     vertices: &mut Vec<ScreenVertex>,
     starts: &mut Vec<usize>,
 ) {
@@ -67,7 +69,7 @@ pub(crate) fn transform(
             let positions = &draws[draw].mesh.positions()[first - starts[draw]..];
             let count = positions.len().min(rest.len());
             let (these, others) = rest.split_at_mut(count);
-            transform_mesh(&draws[draw], viewport, &positions[..count], these);
+            dispatch!(level, _simd => transform_mesh(&draws[draw], viewport, &positions[..count], these));
             rest = others;
             first += count;
             draw += 1;
@@ -75,6 +77,7 @@ pub(crate) fn transform(
     });
 }
 
+#[inline(always)]
 fn transform_mesh(draw: &Draw<'_>, viewport: &Viewport, positions: &[glam::Vec3], vertices: &mut [ScreenVertex]) {
     let matrix = draw.clip_from_mesh;
     for (vertex, &position) in vertices.iter_mut().zip(positions) {
