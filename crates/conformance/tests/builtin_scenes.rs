@@ -5,6 +5,7 @@ use pellucid::core::oracle;
 use pellucid::core::view::direction;
 use pellucid::{Camera, Renderer, Resolve, Scene, View, builtin};
 use pellucid_conformance::layers;
+use pellucid_cpu::{CpuRenderer, simd};
 
 /// Smaller forms of the scenes whose usual size would keep the oracle busy for minutes.
 fn small(name: &str) -> String {
@@ -59,6 +60,18 @@ fn bits_do_not_depend_on_threads_or_repetition() {
                 let image = renderer.render(&scene, &view, Resolve::Blend).unwrap().image;
                 assert!(image == expected, "{source} on {threads} threads");
             }
+        }
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_the_simd_level() {
+    for (source, scene) in scenes() {
+        let view = View::of(&scene).size(113, 70).opacity(0.5);
+        let expected = Renderer::new().render(&scene, &view, Resolve::Blend).unwrap().image;
+        for (name, level) in simd::levels() {
+            let image = CpuRenderer::new(0).level(level).render(&scene, &view, Resolve::Blend).unwrap().image;
+            assert!(image == expected, "{source} at level {name}");
         }
     }
 }

@@ -82,12 +82,23 @@ pub struct Texture {
     sampler: Sampler,
 }
 
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb8(i as u8)));
-static UNORM: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
+/// What the 256 values of a channel mean.
+struct Decoder {
+    linear: [f32; 256],
+    alpha: [f32; 256],
+}
 
-fn decode([r, g, b, a]: [u8; 4]) -> Vec4 {
-    let linear = &*LINEAR;
-    Vec4::new(linear[r as usize], linear[g as usize], linear[b as usize], UNORM[a as usize])
+static DECODER: LazyLock<Decoder> = LazyLock::new(|| Decoder {
+    linear: std::array::from_fn(|i| linear_from_srgb8(i as u8)),
+    alpha: std::array::from_fn(|i| i as f32 / 255.0),
+});
+
+impl Decoder {
+    #[inline(always)]
+    fn decode(&self, [r, g, b, a]: [u8; 4]) -> Vec4 {
+        let linear = &self.linear;
+        Vec4::new(linear[r as usize], linear[g as usize], linear[b as usize], self.alpha[a as usize])
+    }
 }
 
 impl Texture {
@@ -145,7 +156,8 @@ impl Texture {
         match mip_filter {
             Filter::Nearest => self.sample_level((level + 0.5) as usize, self.sampler.minify, uv),
             Filter::Linear => {
-                let (whole, fraction) = (level as usize, level.fract());
+                let whole = level as usize;
+                let fraction = level - whole as f32;
                 let near = self.sample_level(whole, self.sampler.minify, uv);
                 if fraction == 0.0 {
                     return near;
@@ -155,30 +167,29 @@ impl Texture {
         }
     }
 
+    #[inline]
     fn sample_level(&self, level: usize, filter: Filter, uv: Vec2) -> Vec4 {
         let level = &self.levels[level];
         let u = wrap_unit(uv.x, self.sampler.wrap_u) * level.width as f32;
         let v = wrap_unit(uv.y, self.sampler.wrap_v) * level.height as f32;
+        let column = |x: i32| wrap_texel(x, level.width as i32, self.sampler.wrap_u);
+        let row = |y: i32| wrap_texel(y, level.height as i32, self.sampler.wrap_v) * level.width as usize;
+        let decoder = &*DECODER;
+        let at = |row: usize, column: usize| decoder.decode(level.texels[row + column]);
         match filter {
-            Filter::Nearest => decode(self.texel(level, u.floor() as i32, v.floor() as i32)),
+            Filter::Nearest => at(row(floor(v) as i32), column(floor(u) as i32)),
             Filter::Linear => {
                 let (u, v) = (u - 0.5, v - 0.5);
-                let (x, y) = (u.floor(), v.floor());
+                let (x, y) = (floor(u), floor(v));
                 let (fx, fy) = (u - x, v - y);
-                let (x, y) = (x as i32, y as i32);
-                let at = |dx, dy| decode(self.texel(level, x + dx, y + dy));
-                let (top_left, bottom_left) = (at(0, 0), at(0, 1));
-                let top = top_left + (at(1, 0) - top_left) * fx;
-                let bottom = bottom_left + (at(1, 1) - bottom_left) * fx;
-                top + (bottom - top) * fy
+                let (left, right) = (column(x as i32), column(x as i32 + 1));
+                let (top, bottom) = (row(y as i32), row(y as i32 + 1));
+                let (top_left, bottom_left) = (at(top, left), at(bottom, left));
+                let above = top_left + (at(top, right) - top_left) * fx;
+                let below = bottom_left + (at(bottom, right) - bottom_left) * fx;
+                above + (below - above) * fy
             }
         }
-    }
-
-    fn texel(&self, level: &MipLevel, x: i32, y: i32) -> [u8; 4] {
-        let x = wrap_texel(x, level.width, self.sampler.wrap_u);
-        let y = wrap_texel(y, level.height, self.sampler.wrap_v);
-        level.texels[y * level.width as usize + x]
     }
 }
 
@@ -191,25 +202,39 @@ pub fn log2(value: f32) -> f32 {
     exponent as f32 + (mantissa - 1.0)
 }
 
+/// The greatest whole number that is not above `t`. The standard one is a library call where the processor's own
+/// instruction is not sure to be there.
+#[inline(always)]
+fn floor(t: f32) -> f32 {
+    // From 2^23 on every f32 is whole.
+    if t.abs() < 8_388_608.0 {
+        let toward_zero = t as i32 as f32;
+        if toward_zero > t { toward_zero - 1.0 } else { toward_zero }
+    } else {
+        t
+    }
+}
+
 /// Brings a coordinate near 0..=1, so that it can be scaled to texels: whole repeats removed, mirrored halves unfolded
 /// later by [`wrap_texel`].
 fn wrap_unit(t: f32, wrap: Wrap) -> f32 {
     match wrap {
-        Wrap::Repeat => t - t.floor(),
-        Wrap::MirroredRepeat => t - 2.0 * (t * 0.5).floor(),
+        Wrap::Repeat => t - floor(t),
+        Wrap::MirroredRepeat => t - 2.0 * floor(t * 0.5),
         Wrap::ClampToEdge => t.clamp(0.0, 1.0),
     }
 }
 
-/// The texel that stands at position `i`, which may lie outside the level by up to one repeat.
-fn wrap_texel(i: i32, size: u32, wrap: Wrap) -> usize {
-    let size = size as i32;
+/// The texel that stands at position `i`, which lies outside the level by no more than [`wrap_unit`] leaves and one texel.
+#[inline]
+fn wrap_texel(i: i32, size: i32, wrap: Wrap) -> usize {
     let i = match wrap {
-        Wrap::Repeat => i.rem_euclid(size),
-        Wrap::MirroredRepeat => {
-            let i = i.rem_euclid(2 * size);
-            if i < size { i } else { 2 * size - 1 - i }
-        }
+        Wrap::Repeat if i < 0 => i + size,
+        Wrap::Repeat if i >= size => i - size,
+        Wrap::Repeat => i,
+        Wrap::MirroredRepeat if i < 0 || i >= 2 * size => 0,
+        Wrap::MirroredRepeat if i >= size => 2 * size - 1 - i,
+        Wrap::MirroredRepeat => i,
         Wrap::ClampToEdge => i.clamp(0, size - 1),
     };
     i as usize
@@ -223,6 +248,7 @@ fn half(level: &MipLevel) -> Option<MipLevel> {
     let (width, height) = ((level.width / 2).max(1), (level.height / 2).max(1));
     let columns = box_weights(level.width, width);
     let rows = box_weights(level.height, height);
+    let decoder = &*DECODER;
     let mut texels = Vec::with_capacity(width as usize * height as usize);
     for row in &rows {
         for column in &columns {
@@ -230,7 +256,7 @@ fn half(level: &MipLevel) -> Option<MipLevel> {
             for &(y, weight_y) in row {
                 for &(x, weight_x) in column {
                     let weight = weight_x * weight_y;
-                    let texel = decode(level.texels[y as usize * level.width as usize + x as usize]);
+                    let texel = decoder.decode(level.texels[y as usize * level.width as usize + x as usize]);
                     plain += texel * weight;
                     weighted += texel * (weight * texel.w);
                     alpha += weight * texel.w;

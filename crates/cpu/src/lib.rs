@@ -11,6 +11,7 @@ mod bin;
 mod raster;
 mod renderer;
 mod setup;
+pub mod simd;
 mod tile;
 mod transform;
 

@@ -52,7 +52,8 @@ impl CpuRenderer {
         Self { threads, level: Level::new(), pool: OnceLock::new(), memory: Mutex::default() }
     }
 
-    /// The same renderer at another SIMD level than the best of this machine. The picture is the same at any.
+    /// The same renderer at another SIMD level than the best of this machine, see [`simd::levels`](crate::simd::levels).
+    /// The picture is the same at any.
     #[must_use]
     pub fn level(mut self, level: Level) -> Self {
         self.level = level;

@@ -1,7 +1,7 @@
 //! One tile: opaque surfaces through a depth buffer, then transparent ones captured, ordered and resolved.
 
 use fearless_simd::{Level, Simd, dispatch};
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use pellucid_core::composite::Composite;
 use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
@@ -20,8 +20,12 @@ const TILE_SAMPLES: usize = (TILE_PX * TILE_PX) as usize;
 /// Up to so many fragments, insertion is the fastest sort (LFB chapter, section 20.4.1).
 const INSERTION_SORT_MAX: usize = 32;
 
-/// No surface.
+/// No surface; of a surface: no varying colour.
 const NONE: u32 = u32::MAX;
+
+/// In place of a varying colour: the surface is a single fragment, shaded when its alpha was tested. Its colour stands
+/// where others have their normal.
+const SHADED: u32 = u32::MAX - 1;
 
 /// What is captured of a tile, and the memory for it: kept from tile to tile.
 #[derive(Debug)]
@@ -56,7 +60,7 @@ struct Surface {
     anchor_px: [i16; 2],
     draw: u32,
     primitive: u32,
-    /// Place in the table of varying colours, or [`NONE`].
+    /// Place in the table of varying colours, [`NONE`] or [`SHADED`].
     varying: u32,
 }
 
@@ -107,10 +111,25 @@ impl Surfaces {
         self.surfaces.len() as u32 - 1
     }
 
+    /// Adds a surface that is one fragment of the surface at a place, if it passes the alpha test there.
+    #[inline(always)]
+    fn add_shaded(&mut self, place: u32, x: i32, y: i32, draws: &[Draw<'_>]) -> Option<u32> {
+        let color = self.color(place, x, y, draws)?;
+        let mut surface = self.surfaces[place as usize];
+        surface.varying = SHADED;
+        surface.normal.value = color.truncate().into();
+        surface.normal.dx.x = color.w;
+        self.surfaces.push(surface);
+        Some(self.surfaces.len() as u32 - 1)
+    }
+
     /// The colour of the surface at a place, at a pixel.
     #[inline(always)]
     fn color(&self, place: u32, x: i32, y: i32, draws: &[Draw<'_>]) -> Option<Vec4> {
         let surface = &self.surfaces[place as usize];
+        if surface.varying == SHADED {
+            return Some(Vec3::from(surface.normal.value).extend(surface.normal.dx.x));
+        }
         let [anchor_x, anchor_y] = surface.anchor_px;
         let (x, y) = (x - i32::from(anchor_x), y - i32::from(anchor_y));
         let varying = if surface.varying == NONE { None } else { self.varying.get(surface.varying as usize) };
@@ -209,11 +228,16 @@ impl TileCapture {
                 if place == NONE {
                     place = self.surfaces.add(chunk, record, &triangle, weights, draw);
                 }
-                let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
-                if draw.cutoff.is_none() || self.surfaces.color(place, x, y, frame.draws).is_some() {
-                    self.opaque_keys[sample] = key;
-                    self.opaque_surfaces[sample] = place;
+                let mut shaded = place;
+                if draw.cutoff.is_some() {
+                    let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
+                    match self.surfaces.add_shaded(place, x, y, frame.draws) {
+                        Some(fragment) => shaded = fragment,
+                        None => continue,
+                    }
                 }
+                self.opaque_keys[sample] = key;
+                self.opaque_surfaces[sample] = shaded;
             }
         }
     }
@@ -248,14 +272,16 @@ impl TileCapture {
                 if depth.to_bits() < (self.opaque_keys[sample] >> 32) as u32 {
                     continue;
                 }
+                let mut shaded = place;
                 if draw.cutoff.is_some() {
                     let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
-                    if self.surfaces.color(place, x, y, frame.draws).is_none() {
-                        continue;
+                    match self.surfaces.add_shaded(place, x, y, frame.draws) {
+                        Some(fragment) => shaded = fragment,
+                        None => continue,
                     }
                 }
                 self.samples.push(sample as u16);
-                self.keys.push(order_key(depth, place));
+                self.keys.push(order_key(depth, shaded));
             }
         }
     }
