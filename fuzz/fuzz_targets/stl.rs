@@ -1,4 +1,4 @@
-//! Any bytes are a STL scene or an error.
+//! Any bytes are an STL scene or an error.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

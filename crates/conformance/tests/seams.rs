@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{Affine3A, Quat, Vec3, Vec4};
 use pellucid::core::pixel_grid::{Viewport, twice_signed_area};
 use pellucid::core::primitive::draws;
-use pellucid::{Camera, Instance, Layers, Material, Mesh, Projection, Renderer, Scene, View};
+use pellucid::{Camera, Instance, Layers, Material, Mesh, Projection, Renderer, Scene, Technique, View};
 use pellucid_conformance::layers;
 use proptest::prelude::*;
 
@@ -96,6 +96,77 @@ proptest! {
         let layers = layers::gather(&Renderer::new(), &scene, &view).unwrap();
         prop_assert!(!layers.fragments.is_empty() || size < 20);
         prop_assert_eq!(unbalanced_pixels(&scene, &view, &layers), 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
+
+    /// The near plane cuts a closed convex solid open, and the corners that this makes are snapped too: still no line of
+    /// sight enters or leaves twice, or enters without leaving.
+    #[test]
+    fn the_near_plane_opens_no_seam(corners in prop::array::uniform4(prop::array::uniform3(-3.0f32..3.0)), near in 0.1f32..0.9) {
+        let corners = corners.map(Vec3::from_array);
+        let [a, b, c, d] = corners;
+        prop_assume!((b - a).cross(c - a).dot(d - a).abs() > 0.1);
+        let triangles = if (b - a).cross(c - a).dot(d - a) < 0.0 {
+            vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]
+        } else {
+            vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+        };
+        let scene = scene_of((corners.to_vec(), triangles), Affine3A::IDENTITY);
+        let mut view = View::of(&scene).size(64, 48);
+        view.camera = Camera {
+            eye: Vec3::ZERO,
+            target: -Vec3::Z,
+            up: Vec3::Y,
+            projection: Projection::Perspective { fov_y: 1.0, near },
+        };
+        let outward: Vec<Vec3> = scene.meshes()[0]
+            .triangles()
+            .iter()
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|vertex| corners[vertex as usize]);
+                (b - a).cross(c - a)
+            })
+            .collect();
+        let layers = layers::gather(&Renderer::new(), &scene, &view).unwrap();
+        for y in 0..48 {
+            for x in 0..64 {
+                let fragments = layers.pixel(x, y);
+                // The eye is at the origin: a face is entered if it looks back at it.
+                let enters = |primitive: u32| {
+                    let triangle = scene.meshes()[0].triangles()[primitive as usize];
+                    outward[primitive as usize].dot(corners[triangle[0] as usize]) < 0.0
+                };
+                let entries = fragments.iter().filter(|fragment| enters(fragment.primitive)).count();
+                let exits = fragments.len() - entries;
+                prop_assert!(exits <= 1 && entries <= exits, "{} entries and {} exits at {}, {}", entries, exits, x, y);
+            }
+        }
+    }
+}
+
+/// A tetrahedron with a clipped face whose snapped pieces turn over: pixel (22, 16) was covered three times.
+#[test]
+fn a_piece_turned_over_is_taken_off() {
+    let corners = [
+        Vec3::new(1.468_432_5, -2.161_628_8, -1.339_928_2),
+        Vec3::new(-1.961_872_8, 1.971_243_7, -0.738_773_3),
+        Vec3::new(-2.717_852_4, 1.631_689_3, -3.194_776_5),
+        Vec3::new(0.158_422_43, -0.057_478, -0.499_996),
+    ];
+    let scene = scene_of((corners.to_vec(), vec![[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]), Affine3A::IDENTITY);
+    let mut view = View::of(&scene).size(64, 48);
+    view.camera = Camera {
+        eye: Vec3::ZERO,
+        target: -Vec3::Z,
+        up: Vec3::Y,
+        projection: Projection::Perspective { fov_y: 1.0, near: 0.5 },
+    };
+    for technique in [Technique::Cpu, Technique::Oracle] {
+        let layers = layers::gather(&Renderer::new().technique(technique), &scene, &view).unwrap();
+        assert!(layers.depth_complexity(22, 16) <= 2, "{technique}");
     }
 }
 

@@ -7,8 +7,8 @@
 use std::time::Instant;
 
 use crate::layers::OpaqueSurface;
-use crate::pixel_grid::{Viewport, depth_at};
-use crate::primitive::{Draw, NotFinite, Pass, Piece, draws};
+use crate::pixel_grid::{Viewport, depth_at, is_near_outline, may_turn_over, twice_signed_area};
+use crate::primitive::{Draw, Fold, NotFinite, Pass, Piece, draws};
 use crate::resolve::{PixelResolver, finish};
 use crate::shading::{CornerNormals, NormalPlane, Varying, color_at};
 use crate::stats::Step;
@@ -18,6 +18,10 @@ use crate::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Techni
 /// depth in f32 with about three roundings of 2^-24 each, of values up to the greatest of the triangle's corners; 2^-18
 /// allows corners up to a dozen times as near as the fragment.
 pub const AMBIGUOUS_DEPTH: f32 = 1.0 / 262_144.0;
+
+/// An alpha closer than this to the cutoff may pass the test or fail it on another device: texture coordinates are
+/// interpolated in f32, and a texel's alpha may change by its whole range over a 4096th of the texture.
+pub const AMBIGUOUS_ALPHA: f32 = 1.0 / 1024.0;
 
 /// What the oracle captured.
 #[derive(Debug, Clone)]
@@ -49,12 +53,10 @@ pub fn capture(scene: &Scene, view: &View) -> Result<Capture, Error> {
             Pass::Transparent => &mut transparent,
         };
         for triangle in 0..draw.mesh.triangles().len() {
-            let pieces = draw.pieces(triangle, &viewport).unwrap_or_else(|NotFinite| {
-                dropped_triangles += 1;
-                Vec::new()
-            });
-            for piece in pieces {
-                rasterize(draw, triangle, &piece, view, buffer, &mut ambiguous);
+            mark_outlines(draw, triangle, view, &mut ambiguous);
+            match draw.pieces(triangle, &viewport) {
+                Ok(pieces) => rasterize(draw, triangle, &pieces, view, buffer, &mut ambiguous),
+                Err(NotFinite) => dropped_triangles += 1,
             }
         }
     }
@@ -63,10 +65,12 @@ pub fn capture(scene: &Scene, view: &View) -> Result<Capture, Error> {
     for (i, (opaque, transparent)) in opaque.iter_mut().zip(&mut transparent).enumerate() {
         fragment::sort(opaque);
         fragment::sort(transparent);
-        ambiguous[i] |= any_close(opaque.iter().take(2).chain(transparent.iter()));
         let surface = opaque.first().map(|nearest| OpaqueSurface { color: nearest.color, depth: nearest.depth });
         // Behind the opaque surface nothing is captured; at its very depth, something is.
         let hidden_below = surface.map_or(0.0, |surface| surface.depth);
+        let nearly_hidden_below = hidden_below * (1.0 - AMBIGUOUS_DEPTH);
+        let in_sight = transparent.iter().filter(|fragment| fragment.depth >= nearly_hidden_below);
+        ambiguous[i] |= any_close(opaque.iter().take(2).chain(in_sight));
         layers.fragments.extend(transparent.iter().filter(|fragment| fragment.depth >= hidden_below));
         layers.ends.push(layers.fragments.len() as u32);
         layers.opaque.push(surface);
@@ -74,37 +78,69 @@ pub fn capture(scene: &Scene, view: &View) -> Result<Capture, Error> {
     Ok(Capture { layers, ambiguous, dropped_triangles })
 }
 
-/// Tests a piece against every pixel.
+/// Marks the pixels whose centre lies so near the outline of a triangle that is drawn, or might be if rounding turned it
+/// over, that it might be covered or not.
+fn mark_outlines(draw: &Draw<'_>, triangle: usize, view: &View, ambiguous: &mut [bool]) {
+    for corners in draw.outlines(triangle, &Viewport::of(view)) {
+        if !draw.shows_side(twice_signed_area(corners)) && !may_turn_over(corners) {
+            continue;
+        }
+        for (i, ambiguous) in ambiguous.iter_mut().enumerate() {
+            let (x, y) = (i as i32 % view.width as i32, i as i32 / view.width as i32);
+            *ambiguous |= is_near_outline(corners, x, y);
+        }
+    }
+}
+
+/// Tests the pieces of a primitive against every pixel.
 fn rasterize(
     draw: &Draw<'_>,
     triangle: usize,
-    piece: &Piece,
+    pieces: &[Piece],
     view: &View,
     buffer: &mut [Vec<Fragment>],
     ambiguous: &mut [bool],
 ) {
-    let weights = piece.triangle.weight_planes();
-    let depth_plane = piece.triangle.depth_plane(weights);
-    let normals = CornerNormals::new(draw, triangle, &piece.triangle.vertices, &piece.corners);
-    let normal = NormalPlane::new(&normals, weights);
-    let varying = draw.varies().then(|| Varying::new(draw, triangle, piece, weights));
-    let [anchor_x, anchor_y] = piece.triangle.anchor_px();
+    let surfaces: Vec<_> = pieces
+        .iter()
+        .map(|piece| {
+            let weights = piece.triangle.weight_planes();
+            let normals = CornerNormals::new(draw, triangle, &piece.triangle.vertices, &piece.corners);
+            let varying = draw.varies().then(|| Varying::new(draw, triangle, piece, weights));
+            (NormalPlane::new(&normals, weights), varying, piece.triangle.depth_plane(weights))
+        })
+        .collect();
     for y in 0..view.height as i32 {
         for x in 0..view.width as i32 {
             let pixel = y as usize * view.width as usize + x as usize;
-            if piece.triangle.is_ambiguous_at(x, y) {
-                ambiguous[pixel] = true;
-            }
-            if !piece.triangle.covers(x, y) {
-                continue;
-            }
+            let Some(number) = covering_piece(pieces, x, y) else { continue };
+            let (triangle_on_grid, (normal, varying, depth_plane)) = (&pieces[number].triangle, &surfaces[number]);
+            let [anchor_x, anchor_y] = triangle_on_grid.anchor_px();
             let (x, y) = (x - anchor_x, y - anchor_y);
-            if let Some(color) = color_at(draw, &normal, varying.as_ref(), x, y) {
-                let depth = depth_at(&depth_plane, piece.triangle.depth_range(), x, y);
+            if let (Some(varying), Some(cutoff)) = (varying, draw.cutoff) {
+                ambiguous[pixel] |= (varying.straight_color_at(draw, x, y).w - cutoff).abs() <= AMBIGUOUS_ALPHA;
+            }
+            if let Some(color) = color_at(draw, normal, varying.as_ref(), x, y) {
+                let depth = depth_at(depth_plane, triangle_on_grid.depth_range(), x, y);
                 buffer[pixel].push(Fragment { color, depth, primitive: draw.first_primitive + triangle as u32 });
             }
         }
     }
+}
+
+/// The piece by which a primitive covers a pixel: the first one that does, after as many as pieces turned over take off.
+fn covering_piece(pieces: &[Piece], x: i32, y: i32) -> Option<usize> {
+    let mut taken_off = 0;
+    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| piece.triangle.covers(x, y)) {
+        if piece.fold == Fold::TakesOff {
+            taken_off += 1;
+        } else if taken_off > 0 {
+            taken_off -= 1;
+        } else {
+            return Some(number);
+        }
+    }
+    None
 }
 
 /// Whether any two of these fragments lie closer than [`AMBIGUOUS_DEPTH`].

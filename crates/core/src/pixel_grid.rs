@@ -7,7 +7,7 @@
 //! Coordinates: x to the right, y downwards, from the top left corner of the picture; in subpixels unless a name says
 //! pixels (`px`).
 
-use glam::Vec4;
+use glam::{DVec2, Vec4};
 
 use crate::view::View;
 
@@ -150,8 +150,8 @@ impl Edge {
     }
 }
 
-/// A value that is affine over the screen, evaluated at pixel centres: `value + (x - x0) * dx + (y - y0) * dy` in f64, in
-/// exactly this order. Anchored near the triangle, so that little cancels.
+/// A value that is affine over the screen, evaluated at pixel centres: `(value + y * dy) + x * dx` in f64, in exactly this
+/// order, with x and y in pixels from an anchor. Anchored near the triangle, so that little cancels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// Value at the anchor pixel's centre.
@@ -188,6 +188,24 @@ pub fn twice_signed_area([a, b, c]: [ScreenVertex; 3]) -> i64 {
         - (i64::from(c.x) - i64::from(a.x)) * (i64::from(b.y) - i64::from(a.y))
 }
 
+/// Whether a pixel's centre lies within one subpixel of a triangle's outline, so that another rounding of the vertices
+/// might cover it or not. The triangle may have no area.
+pub fn is_near_outline(corners: [ScreenVertex; 3], x_px: i32, y_px: i32) -> bool {
+    let point = DVec2::new(f64::from(center(x_px)), f64::from(center(y_px)));
+    let [a, b, c] = corners.map(|vertex| DVec2::new(f64::from(vertex.x), f64::from(vertex.y)));
+    [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| {
+        let along = to - from;
+        let t = ((point - from).dot(along) / along.length_squared().max(1.0)).clamp(0.0, 1.0);
+        point.distance_squared(from + along * t) <= 1.0
+    })
+}
+
+/// Whether a triangle is so thin that another rounding of its corners might turn it over.
+pub fn may_turn_over(corners: [ScreenVertex; 3]) -> bool {
+    let [a, b, c] = corners.map(|vertex| DVec2::new(f64::from(vertex.x), f64::from(vertex.y)));
+    twice_signed_area(corners).abs() as f64 <= a.distance(b) + b.distance(c) + c.distance(a) + 1.0
+}
+
 impl ScreenTriangle {
     /// The triangle with these corners; `None` unless they run clockwise on the screen around a non-zero area.
     pub fn new(vertices: [ScreenVertex; 3]) -> Option<Self> {
@@ -202,17 +220,6 @@ impl ScreenTriangle {
     /// Whether the triangle covers a pixel.
     pub fn covers(&self, x_px: i32, y_px: i32) -> bool {
         self.edges.iter().all(|edge| edge.biased_at(center(x_px), center(y_px)) >= 0)
-    }
-
-    /// Whether a pixel's centre lies within one subpixel of the triangle's outline, so that another rounding of the
-    /// vertices might cover it or not.
-    pub fn is_ambiguous_at(&self, x_px: i32, y_px: i32) -> bool {
-        let distances = self.edges.map(|edge| {
-            let length = ((edge.a * edge.a + edge.b * edge.b) as f64).sqrt();
-            edge.at(center(x_px), center(y_px)) as f64 / length
-        });
-        let nearest = distances.into_iter().fold(f64::INFINITY, f64::min);
-        nearest.abs() <= 1.0
     }
 
     /// The pixel that its planes are anchored at: the one with the first corner in it.

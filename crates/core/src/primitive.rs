@@ -152,13 +152,31 @@ impl Corners {
     }
 }
 
-/// A triangle on the pixel grid: a primitive, or a part of a clipped one. The pieces of a primitive do not overlap.
+/// A triangle on the pixel grid: a primitive, or a part of a clipped one.
+///
+/// Snapping may turn a thin part of a clipped primitive over, which then covers samples that the other parts cover too
+/// often. Taken off them, what remains is what the snapped outline encloses, and it fits what the primitives beside this
+/// one cover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
     /// The triangle.
     pub triangle: ScreenTriangle,
     /// Where its corners come from.
     pub corners: Corners,
+    /// How it adds to the primitive's coverage.
+    pub fold: Fold,
+}
+
+/// How a piece adds to the coverage of its primitive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fold {
+    /// The primitive covers what its pieces cover: no piece was turned over.
+    #[default]
+    None,
+    /// Turned over: each of its samples takes one coverage off, that of the first piece after it.
+    TakesOff,
+    /// Beside a piece that was turned over: covers a sample unless that is taken off or another piece covered it before.
+    Adds,
 }
 
 /// What becomes of a primitive that cannot be drawn: a vertex is NaN or infinite, or projects beyond the range of f32.
@@ -172,10 +190,7 @@ impl Draw<'_> {
     /// # Errors
     /// [`NotFinite`] if it cannot be drawn.
     pub fn pieces(&self, triangle: usize, viewport: &Viewport) -> Result<Vec<Piece>, NotFinite> {
-        let corners = self.mesh.triangles()[triangle].map(|vertex| {
-            let position = self.mesh.positions()[vertex as usize];
-            transform_point(&self.clip_from_mesh, position)
-        });
+        let corners = self.clip_corners(triangle);
         let codes = corners.map(|clip| viewport.outcode(clip));
         if codes.iter().any(|code| code & outcode::NOT_FINITE != 0) {
             return Err(NotFinite);
@@ -201,30 +216,58 @@ impl Draw<'_> {
         if swapped {
             corners.swap(1, 2);
         }
-        ScreenTriangle::new(corners).map(|triangle| Piece { triangle, corners: Corners::Whole { swapped } })
+        let triangle = ScreenTriangle::new(corners)?;
+        Some(Piece { triangle, corners: Corners::Whole { swapped }, fold: Fold::None })
     }
 
-    /// The pieces of a triangle that has corners on both sides of a clipping plane.
+    /// The pieces of a triangle that has corners on both sides of a clipping plane, those that take off first.
     pub fn clipped_pieces(&self, corners: [Vec4; 3], viewport: &Viewport) -> Vec<Piece> {
         let polygon: Vec<(ScreenVertex, Vec3)> = clip_triangle(corners, viewport)
             .into_iter()
             .map(|vertex| (viewport.project(vertex.clip.as_vec4()), vertex.weights.as_vec3()))
             .collect();
         let fan = || (2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]]);
-        let area: i64 = fan().map(|corners| twice_signed_area(corners.map(|(vertex, _)| vertex))).sum();
+        let signed_area = |corners: [(ScreenVertex, Vec3); 3]| twice_signed_area(corners.map(|(vertex, _)| vertex));
+        let area: i64 = fan().map(signed_area).sum();
         if !self.shows_side(area) {
             return Vec::new();
         }
-        fan()
-            .filter_map(|mut corners| {
-                if area < 0 {
+        let turned_over = |corners| signed_area(corners) * area.signum() < 0;
+        let folded = fan().any(turned_over);
+        let pieces = |take_off: bool| {
+            fan().filter(move |&corners| turned_over(corners) == take_off).filter_map(move |mut corners| {
+                if signed_area(corners) < 0 {
                     corners.swap(1, 2);
                 }
-                // A sliver that snapping turned over is dropped: pieces never overlap.
                 let triangle = ScreenTriangle::new(corners.map(|(vertex, _)| vertex))?;
-                Some(Piece { triangle, corners: Corners::Clipped(corners.map(|(_, weights)| weights)) })
+                let fold = match (folded, take_off) {
+                    (false, _) => Fold::None,
+                    (true, true) => Fold::TakesOff,
+                    (true, false) => Fold::Adds,
+                };
+                Some(Piece { triangle, corners: Corners::Clipped(corners.map(|(_, weights)| weights)), fold })
             })
-            .collect()
+        };
+        pieces(true).chain(pieces(false)).collect()
+    }
+
+    /// The snapped triangles that one triangle of the mesh falls into, drawn or not, with the sides they turn to the
+    /// camera as they come.
+    pub fn outlines(&self, triangle: usize, viewport: &Viewport) -> Vec<[ScreenVertex; 3]> {
+        let corners = self.clip_corners(triangle);
+        if corners.iter().any(|&clip| viewport.outcode(clip) & outcode::NOT_FINITE != 0) {
+            return Vec::new();
+        }
+        let polygon: Vec<_> =
+            clip_triangle(corners, viewport).iter().map(|vertex| viewport.project(vertex.clip.as_vec4())).collect();
+        (2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]]).collect()
+    }
+
+    fn clip_corners(&self, triangle: usize) -> [Vec4; 3] {
+        self.mesh.triangles()[triangle].map(|vertex| {
+            let position = self.mesh.positions()[vertex as usize];
+            transform_point(&self.clip_from_mesh, position)
+        })
     }
 
     /// Whether the side that a triangle of this signed area (clockwise on the screen positive) turns to the camera is

@@ -17,14 +17,15 @@ pub enum Resolve {
     #[default]
     Blend,
     /// Blended with alpha correction (Crassin 2010): layers pair up as entry and exit of a solid, and each gets the
-    /// opacity that half the solid's thickness gives it, so that thick parts are denser than thin ones.
+    /// opacity that half the solid's thickness gives it, so that thick parts are denser than thin ones. A last layer
+    /// without an exit, and no opaque surface behind it, keeps its own opacity.
     BlendCorrected,
     /// Gel (Crassin 2010): light is absorbed between entry and exit of a solid, by thickness; surfaces themselves
     /// neither absorb nor shine. A solid without an exit ends at the opaque surface behind it, or is not shown.
     Gelly,
-    /// The nearest layer alone. Needs no order: the closest fragment of an unsorted capture.
+    /// The nearest layer alone, over the opaque surface. Needs no order: the closest fragment of an unsorted capture.
     Nearest,
-    /// The N-th layer alone, counted from 1, nearest first.
+    /// The N-th layer alone, counted from 1, nearest first, over the background: without the opaque surface.
     Layer(
         /// Number of the layer.
         u32,
@@ -121,16 +122,21 @@ impl PixelResolver {
             }
             Resolve::BlendCorrected => {
                 for solid in fragments.chunks(2) {
-                    let half_thickness = 0.5 * self.thickness(solid, opaque);
+                    let thickness = self.thickness(solid, opaque);
                     for surface in solid {
-                        composite.under(self.absorbed(surface.color, half_thickness));
+                        composite.under(match thickness {
+                            Some(thickness) => self.absorbed(surface.color, 0.5 * thickness),
+                            None => surface.color,
+                        });
                     }
                 }
             }
             Resolve::Gelly => {
                 for solid in fragments.chunks(2) {
                     let mean = solid.iter().map(|f| f.color).sum::<Vec4>() / solid.len() as f32;
-                    composite.under(self.absorbed(mean, self.thickness(solid, opaque)));
+                    if let Some(thickness) = self.thickness(solid, opaque) {
+                        composite.under(self.absorbed(mean, thickness));
+                    }
                 }
             }
             Resolve::Nearest => {
@@ -139,13 +145,10 @@ impl PixelResolver {
                 }
             }
             Resolve::Layer(number) => {
-                return match fragments.get(number as usize - 1) {
-                    Some(fragment) => {
-                        composite.under(fragment.color);
-                        composite.over(self.background)
-                    }
-                    None => self.background,
-                };
+                if let Some(fragment) = (number as usize).checked_sub(1).and_then(|i| fragments.get(i)) {
+                    composite.under(fragment.color);
+                }
+                return composite.over(self.background);
             }
             Resolve::Complexity(_) => return Vec4::splat(fragments.len() as f32),
         }
@@ -153,18 +156,15 @@ impl PixelResolver {
     }
 
     /// Distance along the line of sight from a solid's entry to its exit, in world units: to the opaque surface for a
-    /// solid without exit, 0 if there is none.
-    fn thickness(&self, solid: &[Fragment], opaque: Option<OpaqueSurface>) -> f32 {
+    /// solid without exit, unknown if there is none.
+    fn thickness(&self, solid: &[Fragment], opaque: Option<OpaqueSurface>) -> Option<f32> {
         let exit = match solid {
             [_, exit] => exit.depth,
-            _ => match opaque {
-                Some(surface) => surface.depth,
-                None => return 0.0,
-            },
+            _ => opaque?.depth,
         };
         let length = self.camera.distance_from_depth(exit) - self.camera.distance_from_depth(solid[0].depth);
         // Infinite for a surface at depth 0, which is as thick as can be; never NaN, as 0 - 0 infinities are equal.
-        if length.is_nan() { 0.0 } else { length }
+        Some(if length.is_nan() { 0.0 } else { length })
     }
 
     /// A premultiplied colour as it is after its material absorbed along `length` (Beer and Lambert): a length of one
@@ -229,6 +229,21 @@ mod tests {
         let (gelly, blend) = (resolver(Resolve::Gelly), resolver(Resolve::BlendCorrected));
         let solid = [10.0, 11.7].map(|d| surface(&gelly, d));
         assert!((gelly.pixel(&solid, None).w - blend.pixel(&solid, None).w).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_sheet_without_an_exit_keeps_its_opacity_when_corrected() {
+        let resolver = resolver(Resolve::BlendCorrected);
+        let sheet = surface(&resolver, 10.0);
+        assert_eq!(resolver.pixel(&[sheet], None), sheet.color);
+    }
+
+    #[test]
+    fn layers_that_are_not_there_are_the_background() {
+        for number in [0, 2, u32::MAX] {
+            let resolver = resolver(Resolve::Layer(number));
+            assert_eq!(resolver.pixel(&[surface(&resolver, 10.0)], None), Vec4::ZERO);
+        }
     }
 
     #[test]

@@ -107,8 +107,12 @@ impl Mesh {
     #[must_use]
     pub fn with_smooth_normals(mut self) -> Self {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
+        // Areas of a mesh about 1 large, so that they stay within f32 at any scale.
+        let largest =
+            self.positions.iter().filter(|p| p.is_finite()).fold(0.0, |m: f32, p| m.max(p.abs().max_element()));
+        let scale = 1.0 / largest.max(f32::MIN_POSITIVE);
         for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|v| self.positions[v as usize]);
+            let [a, b, c] = triangle.map(|v| self.positions[v as usize] * scale);
             let twice_area = (b - a).cross(c - a);
             if twice_area.is_finite() {
                 for &vertex in triangle {

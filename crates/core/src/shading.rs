@@ -54,7 +54,9 @@ impl CornerNormals {
         let Some(normals) = draw.mesh.normals() else {
             let positions = draw.mesh.positions();
             let (a, b, c) = (positions[i], positions[j], positions[k]);
-            return constant(draw.view_from_normal * Vec3A::from((b - a).cross(c - a)));
+            // Of edges about 1 long, so that squares of it stay within f32 at any scale.
+            let unit = |edge: Vec3| edge / edge.abs().max_element().max(f32::MIN_POSITIVE);
+            return constant(draw.view_from_normal * Vec3A::from(unit(b - a).cross(unit(c - a))));
         };
         let corner = |vertex: usize| draw.view_from_normal * Vec3A::from(normals[vertex]);
         let [a, b, c] = corners.attribute([corner(i), corner(j), corner(k)]);
@@ -122,6 +124,15 @@ impl Varying {
     /// The colour, premultiplied and unlit, `x` pixels to the right of the anchor and `y` below it; `None` where the alpha
     /// test fails.
     pub fn color_at(&self, draw: &Draw<'_>, x: i32, y: i32) -> Option<Vec4> {
+        let color = self.straight_color_at(draw, x, y);
+        if draw.cutoff.is_some_and(|cutoff| color.w < cutoff) {
+            return None;
+        }
+        Some(draw.premultiplied(color))
+    }
+
+    /// The colour, straight and unlit, before any alpha test.
+    pub fn straight_color_at(&self, draw: &Draw<'_>, x: i32, y: i32) -> Vec4 {
         let [second, third] = self.weights.map(|plane| plane.at(x, y) as f32);
         let weights = [1.0 - second - third, second, third];
         let mut color = draw.material.base_color;
@@ -133,11 +144,7 @@ impl Varying {
             color *= self.texture_color(draw, tex_coords, weights, w);
         }
         // Vertex colours may be anything, and coordinates so large that 1 / w is lost.
-        let color = if color.is_nan() { draw.material.base_color } else { color.clamp(Vec4::ZERO, GREATEST_COLOR) };
-        if draw.cutoff.is_some_and(|cutoff| color.w < cutoff) {
-            return None;
-        }
-        Some(draw.premultiplied(color))
+        if color.is_nan() { draw.material.base_color } else { color.clamp(Vec4::ZERO, GREATEST_COLOR) }
     }
 
     fn texture_color(&self, draw: &Draw<'_>, tex_coords: [Vec2; 3], weights: [f32; 3], w: f32) -> Vec4 {

@@ -12,17 +12,23 @@ pub enum Technique {
     Cpu,
     /// Every triangle against every pixel: slow, obvious, the gold standard.
     Oracle,
+    /// Unsorted hardware blending in draw order: wrong on purpose.
+    Alpha,
+    /// Linearized layered fragment buffer (LFB chapter, section 20.4).
+    Linear,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 2] = [Self::Cpu, Self::Oracle];
+    pub const ALL: [Self; 4] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Linear];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cpu => "cpu",
             Self::Oracle => "oracle",
+            Self::Alpha => "alpha",
+            Self::Linear => "linear",
         }
     }
 
@@ -30,28 +36,33 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
+            Self::Alpha | Self::Linear => "gpu",
         }
     }
 
     /// Whether it captures every fragment and orders all of them.
     pub fn is_exact(self) -> bool {
         match self {
-            Self::Cpu | Self::Oracle => true,
+            Self::Cpu | Self::Oracle | Self::Linear => true,
+            Self::Alpha => false,
         }
     }
 
     /// Passes over the geometry.
     pub fn passes(self) -> &'static str {
         match self {
-            Self::Cpu | Self::Oracle => "1",
+            Self::Cpu | Self::Oracle | Self::Alpha => "1",
+            Self::Linear => "2",
         }
     }
 
     /// Bytes it holds besides scene and picture, as a formula.
     pub fn memory_formula(self) -> &'static str {
         match self {
-            Self::Cpu => "16 B x vertices + 96 B x visible triangles + threads x fragments of a tile x 24 B",
-            Self::Oracle => "24 B x fragments",
+            Self::Cpu => "16 B x vertices + 96 B x visible triangles + threads x fragments of a tile x 18 B",
+            Self::Oracle => "32 B x fragments",
+            Self::Alpha => "8 B x pixels",
+            Self::Linear => "4 B x pixels + 16 B x fragments",
         }
     }
 
@@ -60,6 +71,8 @@ impl Technique {
         match self {
             Self::Cpu => "bins triangles into tiles, captures, sorts and resolves tile by tile on all cores",
             Self::Oracle => "tests every triangle against every pixel; slow, the reference of all others",
+            Self::Alpha => "blends in draw order without sorting; wrong on purpose, a yardstick",
+            Self::Linear => "counts fragments, allocates exactly as much, captures and sorts pixel by pixel",
         }
     }
 }

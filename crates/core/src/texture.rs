@@ -139,7 +139,6 @@ impl Texture {
     /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
     /// changes by `duv_dx` to the right and `duv_dy` downwards.
     pub fn sample(&self, uv: Vec2, duv_dx: Vec2, duv_dy: Vec2) -> Vec4 {
-        // Far beyond this, neighbouring texels share one f32 coordinate; NaN becomes 0.
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
         let base = &self.levels[0];
         let size = Vec2::new(base.width as f32, base.height as f32);

@@ -43,11 +43,15 @@ pub struct View {
 }
 
 impl View {
-    /// A view of `scene` at 1280 x 720 with nothing behind: through the scene's own first camera, else fitted
-    /// to its bounding sphere, from azimuth 30 and elevation 20 degrees.
+    /// A view of `scene` at 1280 x 720 pixels, else as [`View::new`].
     pub fn of(scene: &Scene) -> Self {
+        Self::new(scene, 1280, 720)
+    }
+
+    /// A view of `scene` with nothing behind: through the scene's own first camera, else fitted to its bounding sphere,
+    /// from azimuth 30 and elevation 20 degrees.
+    pub fn new(scene: &Scene, width: u32, height: u32) -> Self {
         let sphere = scene.bounding_sphere();
-        let (width, height) = (1280, 720);
         let camera = scene.cameras().first().copied().unwrap_or_else(|| {
             Camera::fitted(
                 sphere,
@@ -67,7 +71,8 @@ impl View {
         }
     }
 
-    /// The same view at another size.
+    /// The same view at another size. The camera stays: a picture narrower than high cuts off what a camera fitted to a
+    /// wide one saw, where [`View::new`] would step back.
     #[must_use]
     pub fn size(mut self, width: u32, height: u32) -> Self {
         (self.width, self.height) = (width, height);

@@ -1,6 +1,6 @@
 //! The CPU renderer of Pellucid: exact transparency, tile by tile, on all cores, no GPU needed.
 //!
-//! A frame, by module: [`renderer`] runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` turns
+//! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` turns
 //! triangles into records and `bin` hands them to tiles; `tile` captures, orders and resolves one tile through `raster`.
 //!
 //! Fragments live only while their tile is resolved, and hold 8 bytes each until then: depth and the number of their

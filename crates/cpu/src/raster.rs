@@ -7,6 +7,7 @@
 
 use fearless_simd::{Simd, SimdBase, SimdMask, i32x8};
 use pellucid_core::pixel_grid::{Plane, ScreenTriangle, center};
+use pellucid_core::primitive::Fold;
 
 use crate::bin::{PixelRect, TILE_PX};
 
@@ -100,6 +101,54 @@ pub(crate) fn cover<S: Simd>(
         any |= *row;
     }
     any != 0
+}
+
+/// What the pieces of a folded primitive have done to the tile so far, see [`Fold`].
+#[derive(Debug)]
+pub(crate) struct FoldState {
+    primitive: Option<u32>,
+    /// For each sample, how many coverings are still to be taken off.
+    to_take_off: [[u8; TILE_PX as usize]; TILE_PX as usize],
+    /// Rows of samples that the primitive covers.
+    covered: [u32; TILE_PX as usize],
+}
+
+impl Default for FoldState {
+    fn default() -> Self {
+        Self { primitive: None, to_take_off: [[0; TILE_PX as usize]; TILE_PX as usize], covered: [0; TILE_PX as usize] }
+    }
+}
+
+impl FoldState {
+    /// Leaves in `coverage` what a piece adds to its primitive. The pieces of a primitive come one after another, those
+    /// that take off first.
+    #[cold]
+    pub(crate) fn apply(&mut self, fold: Fold, primitive: u32, coverage: &mut Coverage) {
+        if self.primitive != Some(primitive) {
+            *self = Self { primitive: Some(primitive), ..Self::default() };
+        }
+        for y in coverage.top..=coverage.bottom {
+            let mut samples = std::mem::take(&mut coverage.rows[y]) & !self.covered[y];
+            while samples != 0 {
+                let x = samples.trailing_zeros() as usize;
+                samples &= samples - 1;
+                let to_take_off = &mut self.to_take_off[y][x];
+                if fold == Fold::TakesOff {
+                    *to_take_off += 1;
+                } else if *to_take_off > 0 {
+                    *to_take_off -= 1;
+                } else {
+                    coverage.rows[y] |= 1 << x;
+                }
+            }
+            self.covered[y] |= coverage.rows[y];
+        }
+    }
+
+    /// Forgets every primitive.
+    pub(crate) fn reset(&mut self) {
+        self.primitive = None;
+    }
 }
 
 impl Depths {

@@ -1,7 +1,7 @@
 //! Triangles to records: what is in sight and may cover a sample, ready for the tiles.
 
 use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, outcode, twice_signed_area};
-use pellucid_core::primitive::{Corners, Draw, Pass, Piece};
+use pellucid_core::primitive::{Corners, Draw, Fold, Pass, Piece};
 use pellucid_core::shading::CornerNormals;
 
 use crate::bin::{Bins, TileGrid};
@@ -19,6 +19,7 @@ pub(crate) struct Record {
     /// Kept here although the mesh has them: tiles visit triangles in an order that no cache follows.
     pub(crate) normals: CornerNormals,
     corners: RecordCorners,
+    pub(crate) fold: Fold,
 }
 
 /// [`Corners`] in 4 bytes: the weights of clipped ones stand in a table.
@@ -134,7 +135,7 @@ impl Chunk {
             } else {
                 RecordCorners::Whole
             };
-            self.push(span.draw, draw, triangle, corners, kind, grid);
+            self.push(span.draw, draw, triangle, corners, kind, Fold::None, grid);
         }
     }
 
@@ -156,7 +157,7 @@ impl Chunk {
                     RecordCorners::Clipped((self.clipped.len() - 1) as u16)
                 }
             };
-            self.push(draw_number, draw, triangle, piece.triangle.vertices, kind, grid);
+            self.push(draw_number, draw, triangle, piece.triangle.vertices, kind, piece.fold, grid);
         }
     }
 
@@ -168,6 +169,7 @@ impl Chunk {
         triangle: usize,
         vertices: [ScreenVertex; 3],
         corners: RecordCorners,
+        fold: Fold,
         grid: &TileGrid,
     ) {
         let Some(samples) = grid.samples_in_bounds(&vertices) else { return };
@@ -180,7 +182,14 @@ impl Chunk {
         };
         bins.add(self.records.len() as u32, &vertices, samples, grid);
         let normals = CornerNormals::new(draw, triangle, &vertices, &self.corners(corners));
-        self.records.push(Record { vertices, draw: draw_number as u32, triangle: triangle as u32, normals, corners });
+        self.records.push(Record {
+            vertices,
+            draw: draw_number as u32,
+            triangle: triangle as u32,
+            normals,
+            corners,
+            fold,
+        });
     }
 
     /// The record of a number.
@@ -192,7 +201,7 @@ impl Chunk {
     /// The piece that a record stands for.
     #[inline(always)]
     pub(crate) fn piece(&self, record: &Record, triangle: ScreenTriangle) -> Piece {
-        Piece { triangle, corners: self.corners(record.corners) }
+        Piece { triangle, corners: self.corners(record.corners), fold: record.fold }
     }
 
     #[inline(always)]

@@ -6,12 +6,12 @@ use pellucid_core::composite::Composite;
 use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::pixel_grid::ScreenTriangle;
-use pellucid_core::primitive::Draw;
+use pellucid_core::primitive::{Draw, Fold};
 use pellucid_core::shading::{NormalPlane, Varying, color_at};
 use pellucid_core::{Fragment, Layers};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
-use crate::raster::{Coverage, Depths, cover};
+use crate::raster::{Coverage, Depths, FoldState, cover};
 use crate::setup::{Chunk, Record};
 
 /// Samples of a tile.
@@ -31,6 +31,7 @@ const SHADED: u32 = u32::MAX - 1;
 #[derive(Debug)]
 pub(crate) struct TileCapture {
     rect: PixelRect,
+    fold: FoldState,
     surfaces: Surfaces,
     /// Nearest opaque surface: order key so far, and its place in `surfaces`.
     opaque_keys: Vec<u64>,
@@ -141,6 +142,7 @@ impl Default for TileCapture {
     fn default() -> Self {
         Self {
             rect: PixelRect { left: 0, top: 0, right: 0, bottom: 0 },
+            fold: FoldState::default(),
             surfaces: Surfaces::default(),
             opaque_keys: vec![0; TILE_SAMPLES],
             opaque_surfaces: vec![NONE; TILE_SAMPLES],
@@ -175,6 +177,7 @@ impl TileCapture {
         self.surfaces.varying.clear();
         self.samples.clear();
         self.keys.clear();
+        self.fold.reset();
         if self.has_opaque {
             self.opaque_keys.fill(0);
             self.opaque_surfaces.fill(NONE);
@@ -211,6 +214,9 @@ impl TileCapture {
         }
         let draw = &frame.draws[record.draw as usize];
         let primitive = draw.first_primitive + record.triangle;
+        if record.fold != Fold::None {
+            self.fold.apply(record.fold, primitive, coverage);
+        }
         let weights = triangle.weight_planes();
         let depths = Depths::new(&triangle, weights, self.rect);
         let mut place = NONE;
@@ -257,6 +263,9 @@ impl TileCapture {
             return;
         }
         let draw = &frame.draws[record.draw as usize];
+        if record.fold != Fold::None {
+            self.fold.apply(record.fold, draw.first_primitive + record.triangle, coverage);
+        }
         let weights = triangle.weight_planes();
         let depths = Depths::new(&triangle, weights, self.rect);
         let place = self.surfaces.add(chunk, record, &triangle, weights, draw);

@@ -11,6 +11,14 @@ pub enum Error {
     /// A scene, view or option has no meaning.
     #[error(transparent)]
     Core(#[from] pellucid_core::Error),
+    /// The GPU cannot do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] pellucid_gpu::GpuError),
+    /// A technique of the GPU, in a build without it.
+    #[cfg(not(feature = "gpu"))]
+    #[error("'{0}' runs on a GPU, and this build has no GPU renderer (feature `gpu`)")]
+    NoGpu(pellucid_core::Technique),
     /// A picture could not be written; nothing was left behind.
     #[error("cannot write '{}': {detail}", path.display())]
     Save {

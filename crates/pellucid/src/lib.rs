@@ -3,15 +3,14 @@
 //! ```
 //! use pellucid::{Renderer, Resolve, View};
 //!
-//! # fn main() -> Result<(), pellucid::Error> {
-//! # let folder = std::env::temp_dir();
-//! let scene = pellucid::load("@boxes:n=4")?.scene; // or "model.glb"
-//! let view = View::of(&scene).size(320, 180).opacity(0.5);
-//! let frame = Renderer::new().render(&scene, &view, Resolve::Blend)?;
-//! pellucid::save(&frame.image, folder.join("boxes.png"))?;
-//! println!("{} fragments, at most {} behind a pixel", frame.stats.fragments, frame.stats.max_depth_complexity);
-//! # Ok(())
-//! # }
+//! fn main() -> Result<(), pellucid::Error> {
+//!     let scene = pellucid::load("@boxes:n=4")?.scene; // or "model.glb"
+//!     let view = View::of(&scene).size(320, 180).opacity(0.5);
+//!     let frame = Renderer::new().render(&scene, &view, Resolve::Blend)?;
+//!     pellucid::save(&frame.image, std::env::temp_dir().join("boxes.png"))?;
+//!     println!("{} fragments, at most {} behind a pixel", frame.stats.fragments, frame.stats.max_depth_complexity);
+//!     Ok(())
+//! }
 //! ```
 #![forbid(unsafe_code)]
 
@@ -46,3 +45,8 @@ pub fn load(source: &str) -> Result<Loaded, Error> {
 pub fn load_file(path: &std::path::Path) -> Result<Loaded, Error> {
     Ok(pellucid_scene::load_file(path)?)
 }
+
+/// The example in the README is compiled and run like the one above.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct ReadmeExample;

@@ -1,15 +1,24 @@
 //! One renderer for every technique.
 
+#[cfg(feature = "gpu")]
+use std::sync::OnceLock;
+
 use pellucid_core::{Frame, Layers, Resolve, Scene, Stats, Technique, View, oracle};
 use pellucid_cpu::CpuRenderer;
+#[cfg(feature = "gpu")]
+use pellucid_gpu::{ContextOptions, GpuRenderer};
 
 use crate::Error;
 
-/// Renders scenes with a chosen technique. Make one and keep it: it holds on to threads and memory between frames.
+/// Renders scenes with a chosen technique. Make one and keep it: it holds on to threads, devices and memory between frames.
 #[derive(Debug)]
 pub struct Renderer {
     technique: Technique,
+    budget_bytes: Option<u64>,
     cpu: CpuRenderer,
+    /// Opened with the first frame that needs it.
+    #[cfg(feature = "gpu")]
+    gpu: OnceLock<GpuRenderer>,
 }
 
 impl Default for Renderer {
@@ -21,10 +30,17 @@ impl Default for Renderer {
 impl Renderer {
     /// The CPU renderer on all cores.
     pub fn new() -> Self {
-        Self { technique: Technique::Cpu, cpu: CpuRenderer::new(0) }
+        Self {
+            technique: Technique::Cpu,
+            budget_bytes: None,
+            cpu: CpuRenderer::new(0),
+            #[cfg(feature = "gpu")]
+            gpu: OnceLock::new(),
+        }
     }
 
-    /// The same renderer with another technique.
+    /// The same renderer with another technique. One of the GPU opens the best device there is, a software one too, with
+    /// the first frame.
     #[must_use]
     pub fn technique(mut self, technique: Technique) -> Self {
         self.technique = technique;
@@ -38,14 +54,37 @@ impl Renderer {
         self
     }
 
+    /// The same renderer with a budget: bytes that a capture on the GPU may hold. The picture is the same at any.
+    #[must_use]
+    pub fn budget_bytes(mut self, budget_bytes: u64) -> Self {
+        self.budget_bytes = Some(budget_bytes);
+        #[cfg(feature = "gpu")]
+        {
+            self.gpu = OnceLock::new();
+        }
+        self
+    }
+
+    /// The same renderer on a GPU device of one's own choice.
+    #[cfg(feature = "gpu")]
+    #[must_use]
+    pub fn gpu(mut self, gpu: GpuRenderer) -> Self {
+        self.gpu = OnceLock::from(gpu);
+        self
+    }
+
     /// Renders a picture.
     ///
     /// # Errors
-    /// [`Error::Core`] if the view is invalid.
+    /// [`Error::Core`] if the view is invalid, `Error::Gpu` if a GPU is needed and cannot do it.
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
         Ok(match self.technique {
             Technique::Cpu => self.cpu.render(scene, view, resolve)?,
             Technique::Oracle => oracle::render(scene, view, resolve)?,
+            #[cfg(feature = "gpu")]
+            technique => self.opened_gpu()?.render(scene, view, resolve, technique)?,
+            #[cfg(not(feature = "gpu"))]
+            technique => return Err(Error::NoGpu(technique)),
         })
     }
 
@@ -54,7 +93,7 @@ impl Renderer {
     /// is gone after the call.
     ///
     /// # Errors
-    /// [`Error::Core`] if the view is invalid.
+    /// As [`Self::render`].
     pub fn layers(&self, scene: &Scene, view: &View, visit: impl Fn(&Layers) + Sync) -> Result<Stats, Error> {
         Ok(match self.technique {
             Technique::Cpu => self.cpu.layers(scene, view, visit)?,
@@ -63,6 +102,22 @@ impl Renderer {
                 visit(&capture.layers);
                 oracle::resolve_capture(&capture, scene, view, Resolve::Blend).1
             }
+            #[cfg(feature = "gpu")]
+            technique => self.opened_gpu()?.layers(scene, view, technique, visit)?,
+            #[cfg(not(feature = "gpu"))]
+            technique => return Err(Error::NoGpu(technique)),
         })
+    }
+
+    #[cfg(feature = "gpu")]
+    fn opened_gpu(&self) -> Result<&GpuRenderer, Error> {
+        if let Some(gpu) = self.gpu.get() {
+            return Ok(gpu);
+        }
+        let mut gpu = GpuRenderer::new(&ContextOptions { allow_software: true, ..ContextOptions::default() })?;
+        if let Some(budget_bytes) = self.budget_bytes {
+            gpu = gpu.budget_bytes(budget_bytes);
+        }
+        Ok(self.gpu.get_or_init(|| gpu))
     }
 }
