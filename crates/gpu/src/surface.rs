@@ -1,0 +1,369 @@
+//! Drawing surfaces: what every pass over the scene's triangles has in common.
+//!
+//! Bind groups: 0 frame and draw, 1 scene, 2 texture, 3 whatever the technique brings. The fragment half of a pipeline is
+//! the technique's, the vertex half is `shaders/pass/vertex.wesl`.
+
+use std::collections::HashMap;
+
+use pellucid_core::primitive::{Draw, Pass, draws};
+use pellucid_core::{Scene, View};
+use wgpu::{BindGroup, BindGroupLayout, BindingType, BufferBindingType, ShaderStages};
+
+use crate::gpu_data::{DrawData, FrameData};
+use crate::upload::SceneUpload;
+use crate::{Context, GpuError, shaders};
+
+/// Long-lived: layouts, the vertex shader, and what stands in for a texture where there is none.
+#[derive(Debug)]
+pub(crate) struct SurfaceLayouts {
+    pub(crate) frame: BindGroupLayout,
+    pub(crate) scene: BindGroupLayout,
+    pub(crate) texture: BindGroupLayout,
+    vertex: wgpu::ShaderModule,
+    no_texture: BindGroup,
+    /// In place of the opaque depth while that is being drawn.
+    no_depth: wgpu::TextureView,
+}
+
+/// Which faces are left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Cull {
+    None,
+    Back,
+    /// Front faces run clockwise.
+    BackMirrored,
+}
+
+/// One instance, ready to be recorded.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurfaceDraw {
+    pass: Pass,
+    corners: u32,
+    cull: Cull,
+    varies: bool,
+    has_cutoff: bool,
+    texture: Option<usize>,
+    uniform_offset: u32,
+}
+
+/// Per frame: all instances of the scene in a view.
+#[derive(Debug)]
+pub(crate) struct Surfaces<'a> {
+    draws: Vec<SurfaceDraw>,
+    scene: &'a SceneUpload,
+    layouts: &'a SurfaceLayouts,
+    /// One for each [`Pass`].
+    opaque_group: BindGroup,
+    transparent_group: BindGroup,
+    pub(crate) dropped_triangles: u64,
+}
+
+/// What a pass does with surfaces.
+#[derive(Debug, Clone)]
+pub(crate) struct SurfacePass<'a> {
+    pub(crate) label: &'static str,
+    /// The linked shader with the fragment entry points.
+    pub(crate) wgsl: &'static str,
+    /// Entry point where colour does not vary; takes `Plain`, or `Position` if `ignores_color`.
+    pub(crate) plain: &'static str,
+    /// Entry point where it does; takes `Varied`.
+    pub(crate) varied: &'static str,
+    /// Whether only the alpha test needs to know colours.
+    pub(crate) ignores_color: bool,
+    pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
+    pub(crate) depth_stencil: wgpu::DepthStencilState,
+    /// Group 3.
+    pub(crate) own_layout: Option<&'a BindGroupLayout>,
+}
+
+/// Long-lived: the pipelines of a pass, made as they are needed.
+#[derive(Debug)]
+pub(crate) struct SurfacePipelines {
+    label: &'static str,
+    plain: &'static str,
+    varied: &'static str,
+    ignores_color: bool,
+    targets: Vec<Option<wgpu::ColorTargetState>>,
+    depth_stencil: wgpu::DepthStencilState,
+    layout: wgpu::PipelineLayout,
+    fragment: wgpu::ShaderModule,
+    pipelines: HashMap<(Cull, bool), wgpu::RenderPipeline>,
+}
+
+impl SurfaceLayouts {
+    pub(crate) fn new(gpu: &Context) -> Self {
+        let device = &gpu.device;
+        let both = ShaderStages::VERTEX_FRAGMENT;
+        let uniform = |binding, has_dynamic_offset| {
+            let ty = BindingType::Buffer { ty: BufferBindingType::Uniform, has_dynamic_offset, min_binding_size: None };
+            wgpu::BindGroupLayoutEntry { binding, visibility: both, ty, count: None }
+        };
+        let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: ShaderStages::FRAGMENT,
+            ty: BindingType::Texture {
+                sample_type,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            count: None,
+        };
+        let layout = |label, entries: &[_]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let frame = layout(
+            "frame and draw",
+            &[uniform(0, false), uniform(1, true), texture(2, wgpu::TextureSampleType::Depth)],
+        );
+        let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, both, true)));
+        let texture_layout = layout("texture", &[texture(0, wgpu::TextureSampleType::Float { filterable: false })]);
+        let one_texel = |format| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("none"),
+                size: wgpu::Extent3d::default(),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+        };
+        let no_depth = one_texel(wgpu::TextureFormat::Depth32Float).create_view(&Default::default());
+        let no_texture = texture_group(device, &texture_layout, &one_texel(wgpu::TextureFormat::Rgba8UnormSrgb));
+        Self {
+            frame,
+            scene,
+            texture: texture_layout,
+            vertex: shader(gpu, "vertex", shaders::VERTEX),
+            no_texture,
+            no_depth,
+        }
+    }
+
+    pub(crate) fn texture_bind_group(&self, gpu: &Context, texture: &wgpu::Texture) -> BindGroup {
+        texture_group(&gpu.device, &self.texture, texture)
+    }
+}
+
+fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, texture: &wgpu::Texture) -> BindGroup {
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("texture"),
+        layout,
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: wgpu::BindingResource::TextureView(&texture.create_view(&Default::default())),
+        }],
+    })
+}
+
+/// The layout entry of a storage buffer.
+pub(crate) fn storage_entry(binding: u32, visibility: ShaderStages, read_only: bool) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility,
+        ty: BindingType::Buffer {
+            ty: BufferBindingType::Storage { read_only },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    }
+}
+
+/// A linked shader as a module.
+pub(crate) fn shader(gpu: &Context, label: &str, wgsl: &'static str) -> wgpu::ShaderModule {
+    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+    })
+}
+
+impl<'a> Surfaces<'a> {
+    /// Works out all draws of a view and sends what the shaders need to know of them.
+    pub(crate) fn new(
+        gpu: &Context,
+        layouts: &'a SurfaceLayouts,
+        upload: &'a SceneUpload,
+        (scene, view): (&Scene, &View),
+        frame_data: &wgpu::Buffer,
+        opaque_depth: &wgpu::TextureView,
+    ) -> Result<Self, GpuError> {
+        let stride = size_of::<DrawData>().next_multiple_of(gpu.limits.min_uniform_buffer_offset_alignment as usize);
+        let core_draws = draws(scene, view)?;
+        let mut bytes = vec![0; stride * core_draws.len().max(1)];
+        let mut dropped_triangles = 0;
+        let surface_draws = (core_draws.iter().zip(scene.instances()).zip(bytes.chunks_exact_mut(stride)).enumerate())
+            .map(|(i, ((draw, instance), bytes))| {
+                let mesh = &upload.meshes[instance.mesh.index()];
+                let may_overflow = may_overflow(draw, mesh.reach);
+                if may_overflow {
+                    dropped_triangles += count_dropped(draw);
+                }
+                let data = DrawData::new(draw, &mesh.places, may_overflow);
+                bytes[..size_of::<DrawData>()].copy_from_slice(bytemuck::bytes_of(&data));
+                SurfaceDraw {
+                    pass: draw.pass,
+                    corners: draw.mesh.triangles().len() as u32 * 3,
+                    cull: match (draw.culls_back_faces, draw.mirrored) {
+                        (false, _) => Cull::None,
+                        (true, false) => Cull::Back,
+                        (true, true) => Cull::BackMirrored,
+                    },
+                    varies: draw.varies(),
+                    has_cutoff: draw.cutoff.is_some(),
+                    texture: draw.texture.map(|(_, material)| material.texture.index()),
+                    uniform_offset: (i * stride) as u32,
+                }
+            })
+            .collect();
+        let uniforms = gpu.buffer(
+            "the instances",
+            bytes.len() as u64,
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        )?;
+        gpu.queue.write_buffer(&uniforms, 0, &bytes);
+        let draw_data = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &uniforms,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<DrawData>() as u64),
+        });
+        let group = |depth| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame and draw"),
+                layout: &layouts.frame,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: frame_data.as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: draw_data.clone() },
+                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(depth) },
+                ],
+            })
+        };
+        debug_assert_eq!(frame_data.size(), size_of::<FrameData>() as u64);
+        Ok(Self {
+            draws: surface_draws,
+            scene: upload,
+            layouts,
+            opaque_group: group(&layouts.no_depth),
+            transparent_group: group(opaque_depth),
+            dropped_triangles,
+        })
+    }
+
+    /// Records all draws of a part of the frame, in draw order. Group 3 must be set if the pipelines have one.
+    pub(crate) fn draw(
+        &self,
+        gpu: &Context,
+        recording: &mut wgpu::RenderPass<'_>,
+        pass: Pass,
+        pipelines: &mut SurfacePipelines,
+    ) {
+        let frame_group = match pass {
+            Pass::Opaque => &self.opaque_group,
+            Pass::Transparent => &self.transparent_group,
+        };
+        recording.set_bind_group(1, &self.scene.bind_group, &[]);
+        for draw in self.draws.iter().filter(|draw| draw.pass == pass) {
+            let varied = if pipelines.ignores_color { draw.has_cutoff } else { draw.varies };
+            recording.set_pipeline(pipelines.get(gpu, self.layouts, draw.cull, varied));
+            recording.set_bind_group(0, frame_group, &[draw.uniform_offset]);
+            let texture = draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]);
+            recording.set_bind_group(2, texture, &[]);
+            recording.draw(0..draw.corners, 0..1);
+        }
+    }
+}
+
+/// Whether clip coordinates of a mesh that reaches so far could leave the range of f32.
+fn may_overflow(draw: &Draw<'_>, reach: glam::Vec3) -> bool {
+    let bound = draw.clip_from_mesh.to_cols_array_2d().map(|column| column.map(|value| f64::from(value.abs())));
+    (0..4).any(|row| {
+        let [x, y, z, w] = bound.map(|column| column[row]);
+        let greatest = x * f64::from(reach.x) + y * f64::from(reach.y) + z * f64::from(reach.z) + w;
+        // Half of it, for rounding; written so that NaN may.
+        !(greatest < f64::from(f32::MAX) * 0.5)
+    })
+}
+
+fn count_dropped(draw: &Draw<'_>) -> u64 {
+    let is_finite = |&vertex: &u32| {
+        let position = draw.mesh.positions()[vertex as usize];
+        pellucid_core::primitive::transform_point(&draw.clip_from_mesh, position).is_finite()
+    };
+    draw.mesh.triangles().iter().filter(|triangle| !triangle.iter().all(is_finite)).count() as u64
+}
+
+impl SurfacePipelines {
+    pub(crate) fn new(gpu: &Context, layouts: &SurfaceLayouts, pass: &SurfacePass<'_>) -> Self {
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(pass.label),
+            bind_group_layouts: &[
+                Some(&layouts.frame),
+                Some(&layouts.scene),
+                Some(&layouts.texture),
+                pass.own_layout,
+            ],
+            immediate_size: 0,
+        });
+        Self {
+            label: pass.label,
+            plain: pass.plain,
+            varied: pass.varied,
+            ignores_color: pass.ignores_color,
+            targets: pass.targets.to_vec(),
+            depth_stencil: pass.depth_stencil.clone(),
+            layout,
+            fragment: shader(gpu, pass.label, pass.wgsl),
+            pipelines: HashMap::new(),
+        }
+    }
+
+    fn get(&mut self, gpu: &Context, layouts: &SurfaceLayouts, cull: Cull, varied: bool) -> &wgpu::RenderPipeline {
+        self.pipelines.entry((cull, varied)).or_insert_with(|| {
+            let (vertex_entry, fragment_entry) = match (varied, self.ignores_color) {
+                (true, _) => ("varied", self.varied),
+                (false, true) => ("position", self.plain),
+                (false, false) => ("plain", self.plain),
+            };
+            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(self.label),
+                layout: Some(&self.layout),
+                vertex: wgpu::VertexState {
+                    module: &layouts.vertex,
+                    entry_point: Some(vertex_entry),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    cull_mode: (cull != Cull::None).then_some(wgpu::Face::Back),
+                    front_face: match cull {
+                        Cull::BackMirrored => wgpu::FrontFace::Cw,
+                        _ => wgpu::FrontFace::Ccw,
+                    },
+                    ..Default::default()
+                },
+                depth_stencil: Some(self.depth_stencil.clone()),
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &self.fragment,
+                    entry_point: Some(fragment_entry),
+                    compilation_options: Default::default(),
+                    targets: &self.targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        })
+    }
+}
+
+/// The depth attachment's state: nearer or equal passes, so that of equals the later drawn stays.
+pub(crate) fn depth_state(writes: bool, tests: bool) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: wgpu::TextureFormat::Depth32Float,
+        depth_write_enabled: Some(writes),
+        depth_compare: Some(if tests { wgpu::CompareFunction::GreaterEqual } else { wgpu::CompareFunction::Always }),
+        stencil: Default::default(),
+        bias: Default::default(),
+    }
+}

@@ -1,0 +1,143 @@
+//! The linearized LFB: fragments are counted, counts are summed up, and exactly as much is allocated as there is to
+//! capture (LFB chapter, section 20.4). Twin: `shaders/technique/linear.wesl`.
+//!
+//! The offset table is summed in place, as in the chapter, and captured into in place: where a pixel's fragments start
+//! becomes where they end. Unlike the chapter's it is not padded to a power of two, and has one entry more, in which the
+//! total appears.
+
+use pellucid_core::primitive::Pass;
+use wgpu::{BindGroupLayout, ShaderStages};
+
+use super::{Capture, Layouts, Outcome};
+use crate::frame::Frame;
+use crate::memory::Window;
+use crate::pass::ordered::{LfbShaders, OrderedPasses};
+use crate::pass::prefix_sum::PrefixSum;
+use crate::readback::read_buffer;
+use crate::surface::{SurfacePass, SurfacePipelines, depth_state, storage_entry};
+use crate::{Context, GpuError, shaders};
+
+/// Bytes of a stored fragment.
+const FRAGMENT_BYTES: u64 = 16;
+
+const OFFSETS: &str = "offsets";
+const FRAGMENTS: &str = "fragments";
+
+/// Long-lived half.
+#[derive(Debug)]
+pub(crate) struct Linear {
+    layout: BindGroupLayout,
+    count: SurfacePipelines,
+    capture: SurfacePipelines,
+    prefix_sum: PrefixSum,
+    ordered: OrderedPasses,
+}
+
+impl Linear {
+    pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
+        let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
+        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("linear"),
+            entries: &[0, 1].map(|binding| storage_entry(binding, visibility, false)),
+        });
+        let pass = |label, plain, varied, ignores_color| SurfacePass {
+            label,
+            wgsl: shaders::LINEAR,
+            plain,
+            varied,
+            ignores_color,
+            targets: &[],
+            depth_stencil: depth_state(false, false),
+            own_layout: Some(&layout),
+        };
+        let pipelines = |pass| SurfacePipelines::new(gpu, layouts.surfaces, &pass);
+        let ordered_shaders = LfbShaders {
+            sort: shaders::SORT_LINEAR,
+            resolve: shaders::RESOLVE_LINEAR,
+            gather: shaders::GATHER_LINEAR,
+        };
+        Self {
+            count: pipelines(pass("count render", "count", "count_varied", true)),
+            capture: pipelines(pass("main render", "capture", "capture_varied", false)),
+            prefix_sum: PrefixSum::new(gpu),
+            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
+            layout,
+        }
+    }
+
+    /// All buffers of a window with so many pixels and fragments.
+    fn needs(pixels: u64, fragments: u64) -> Vec<(&'static str, u64)> {
+        let mut needs = vec![(OFFSETS, (pixels + 1) * 4), (FRAGMENTS, fragments * FRAGMENT_BYTES)];
+        needs.extend(PrefixSum::needs(pixels + 1));
+        needs
+    }
+
+    fn bind_group(&self, gpu: &Context, offsets: &wgpu::Buffer, fragments: &wgpu::Buffer) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("linear"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: offsets.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: fragments.as_entire_binding() },
+            ],
+        })
+    }
+}
+
+impl Capture for Linear {
+    fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
+        let (gpu, pixels) = (frame.gpu, window.pixels());
+        if !frame.memory.fits(gpu, &Self::needs(pixels, 0)) {
+            return frame.memory.halves(gpu, window, &Self::needs(pixels, 0));
+        }
+
+        // Steps 1 and 2: fragments of each pixel.
+        let entries = pixels + 1;
+        frame.memory.make_room(&Self::needs(pixels, 0));
+        let offsets = frame.memory.buffer(gpu, OFFSETS, entries * 4)?;
+        frame.zero("zero", &offsets, entries * 4)?;
+        // Counting does not touch the fragments: any will do in their place.
+        let fragments = frame.memory.buffer(gpu, FRAGMENTS, FRAGMENT_BYTES)?;
+        let group = self.bind_group(gpu, &offsets, &fragments);
+        let mut pass = frame.capture_pass("count render", window)?;
+        pass.set_bind_group(3, &group, &[]);
+        frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.count);
+        drop(pass);
+
+        // Step 3: where they go, and how many there are.
+        self.prefix_sum.record(frame, "prefix sums", &offsets, entries)?;
+        let total: u32 = read_buffer(frame, &offsets, pixels, 1)?[0];
+        let needs = Self::needs(pixels, total.into());
+        if total == u32::MAX || !frame.memory.fits(gpu, &needs) {
+            let starts: Vec<u32> = read_buffer(frame, &offsets, 0, entries)?;
+            return split(frame, window, &starts);
+        }
+
+        // Step 4: exactly that much is allocated, and captured into.
+        frame.memory.make_room(&needs);
+        let fragments = frame.memory.buffer(gpu, FRAGMENTS, u64::from(total) * FRAGMENT_BYTES)?;
+        let group = self.bind_group(gpu, &offsets, &fragments);
+        let mut pass = frame.capture_pass("main render", window)?;
+        pass.set_bind_group(3, &group, &[]);
+        frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.capture);
+        drop(pass);
+        self.ordered.record(frame, window, &group)?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// Parts of a window that fit, now that it is known where each pixel's fragments start.
+fn split(frame: &Frame<'_>, window: Window, starts: &[u32]) -> Result<Outcome, GpuError> {
+    // Sums stick at the greatest number: what lies beyond is counted again in smaller windows.
+    if starts.last() == Some(&u32::MAX)
+        && let Some(halves) = window.halves()
+    {
+        return Ok(Outcome::Split(halves.to_vec()));
+    }
+    let counts: Vec<u32> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let fits = |pixels, fragments| frame.memory.fits(frame.gpu, &Linear::needs(pixels, fragments));
+    match window.parts(&counts, fits) {
+        Ok(parts) => Ok(Outcome::Split(parts)),
+        Err(fragments) => Err(frame.memory.refusal(frame.gpu, &Linear::needs(1, fragments))),
+    }
+}

@@ -1,0 +1,48 @@
+//! The techniques, one file each, behind one small trait. Twins of their shaders: `shaders/technique`.
+//!
+//! A technique is the long-lived half: pipelines, and estimates that are good for the next frame. Buffers it asks of
+//! [`Frame::memory`], which keeps them by name and counts their bytes. The per-frame half is [`Frame`].
+
+mod alpha;
+mod linear;
+
+use pellucid_core::Technique;
+use wgpu::BindGroupLayout;
+
+use crate::frame::Frame;
+use crate::memory::Window;
+use crate::surface::SurfaceLayouts;
+use crate::{Context, GpuError};
+
+/// What became of a window.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Outcome {
+    /// It is in the picture, or among the layers.
+    Done,
+    /// It does not fit; nothing of it was drawn. These parts of it will be asked for instead, in this order.
+    Split(Vec<Window>),
+}
+
+/// A way to capture and order fragments, on the GPU.
+pub(crate) trait Capture: std::fmt::Debug + Send {
+    /// Captures the transparent fragments of a window in front of the opaque surfaces, orders them, and records or runs
+    /// everything up to the frame's goal. The frame is already aimed at the window.
+    fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError>;
+}
+
+/// Layouts that techniques share.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layouts<'a> {
+    pub(crate) surfaces: &'a SurfaceLayouts,
+    /// Group 0 of passes over pixels.
+    pub(crate) picture: &'a BindGroupLayout,
+}
+
+/// The long-lived half of a technique.
+pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, technique: Technique) -> Result<Box<dyn Capture>, GpuError> {
+    match technique {
+        Technique::Alpha => Ok(Box::new(alpha::Alpha::new(gpu, layouts))),
+        Technique::Linear => Ok(Box::new(linear::Linear::new(gpu, layouts))),
+        Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
+    }
+}

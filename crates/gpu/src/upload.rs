@@ -1,0 +1,128 @@
+//! A scene on the GPU: all meshes in three storage buffers, textures with the mip levels of the core. Kept while the
+//! scene's revision stays the same.
+
+use glam::Vec3;
+use pellucid_core::{Scene, Texture};
+use wgpu::{BindGroup, BufferUsages, TextureUsages};
+
+use crate::gpu_data::MeshPlaces;
+use crate::surface::SurfaceLayouts;
+use crate::{Context, GpuError};
+
+/// A mesh of the scene, and how far its vertices reach.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MeshUpload {
+    pub(crate) places: MeshPlaces,
+    /// Greatest coordinate of a vertex that is used, on each axis; NaN or infinite if there is such a vertex.
+    pub(crate) reach: Vec3,
+}
+
+/// A scene on the GPU.
+#[derive(Debug)]
+pub(crate) struct SceneUpload {
+    pub(crate) revision: u64,
+    pub(crate) meshes: Vec<MeshUpload>,
+    pub(crate) bind_group: BindGroup,
+    pub(crate) textures: Vec<BindGroup>,
+}
+
+impl SceneUpload {
+    pub(crate) fn new(gpu: &Context, layouts: &SurfaceLayouts, scene: &Scene) -> Result<Self, GpuError> {
+        let mut positions: Vec<f32> = Vec::new();
+        let mut attributes: Vec<f32> = Vec::new();
+        let mut indices: Vec<u32> = Vec::new();
+        let mut meshes = Vec::with_capacity(scene.meshes().len());
+        for mesh in scene.meshes() {
+            let mut places = MeshPlaces {
+                first_index: place(&indices)?,
+                first_vertex: place(&positions)? / 3,
+                normals: place(&attributes)?,
+                ..MeshPlaces::default()
+            };
+            attributes.extend_from_slice(bytemuck::cast_slice(mesh.normals().unwrap_or_default()));
+            places.tex_coords = place(&attributes)?;
+            attributes.extend_from_slice(bytemuck::cast_slice(mesh.tex_coords().unwrap_or_default()));
+            places.colors = place(&attributes)?;
+            attributes.extend_from_slice(bytemuck::cast_slice(mesh.colors().unwrap_or_default()));
+            positions.extend_from_slice(bytemuck::cast_slice(mesh.positions()));
+            indices.extend(mesh.triangles().as_flattened().iter().map(|&vertex| places.first_vertex + vertex));
+            meshes.push(MeshUpload { places, reach: reach(mesh) });
+        }
+        let buffers = [
+            storage(gpu, "the scene's positions", bytemuck::cast_slice(&positions))?,
+            storage(gpu, "the scene's attributes", bytemuck::cast_slice(&attributes))?,
+            storage(gpu, "the scene's indices", bytemuck::cast_slice(&indices))?,
+        ];
+        let entries = [0, 1, 2].map(|binding| wgpu::BindGroupEntry {
+            binding,
+            resource: buffers[binding as usize].as_entire_binding(),
+        });
+        let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &layouts.scene,
+            entries: &entries,
+        });
+        let textures = scene
+            .textures()
+            .iter()
+            .map(|texture| Ok(layouts.texture_bind_group(gpu, &upload_texture(gpu, texture)?)))
+            .collect::<Result<_, GpuError>>()?;
+        gpu.check()?;
+        Ok(Self { revision: scene.revision(), meshes, bind_group, textures })
+    }
+}
+
+fn reach(mesh: &pellucid_core::Mesh) -> Vec3 {
+    mesh.triangles().as_flattened().iter().fold(Vec3::ZERO, |reach, &vertex| {
+        let position = mesh.positions()[vertex as usize].abs();
+        // Unlike `max`, keeps what is not a number.
+        Vec3::select(position.cmple(reach), reach, position)
+    })
+}
+
+/// The place behind everything so far, in numbers.
+fn place<T>(so_far: &[T]) -> Result<u32, GpuError> {
+    u32::try_from(so_far.len()).map_err(|_| GpuError::Limit {
+        what: "the scene".into(),
+        size: so_far.len() as u64 * 4,
+        limit: u64::from(u32::MAX) * 4,
+        limit_name: "32-bit numbers",
+    })
+}
+
+fn storage(gpu: &Context, label: &str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    // Bindings may not be empty.
+    let size = (bytes.len() as u64).max(16);
+    let buffer = gpu.buffer(label, size, BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::INDEX)?;
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    Ok(buffer)
+}
+
+fn upload_texture(gpu: &Context, texture: &Texture) -> Result<wgpu::Texture, GpuError> {
+    let levels = texture.levels();
+    let size = wgpu::Extent3d { width: levels[0].width, height: levels[0].height, depth_or_array_layers: 1 };
+    let uploaded = gpu.texture(&wgpu::TextureDescriptor {
+        label: Some("a texture"),
+        size,
+        mip_level_count: levels.len() as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
+        view_formats: &[],
+    })?;
+    for (mip_level, level) in (0..).zip(levels) {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &uploaded,
+                mip_level,
+                origin: wgpu::Origin3d::ZERO,
+                aspect: wgpu::TextureAspect::All,
+            },
+            level.texels.as_flattened(),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
+            wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
+        );
+    }
+    Ok(uploaded)
+}
