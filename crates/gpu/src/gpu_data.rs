@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec2, Vec4};
 use pellucid_core::pixel_grid::SUBPIXELS;
 use pellucid_core::primitive::Draw;
-use pellucid_core::texture::{Filter, Sampler, Wrap};
-use pellucid_core::{Projection, Resolve, View};
+use pellucid_core::texture::{Filter, Wrap};
+use pellucid_core::{Projection, Resolve, Texture, View};
 
 use crate::memory::Window;
 
@@ -93,7 +93,7 @@ pub struct DrawData {
     pub colors: u32,
     /// See [`flags`].
     pub flags: u32,
-    /// See [`sampling_bits`].
+    /// How its texture is sampled, in bits.
     pub sampling: u32,
 }
 
@@ -137,7 +137,7 @@ impl DrawData {
             | bit(draw.texture.is_some(), flags::HAS_TEXTURE);
         let normal = draw.view_from_normal;
         let (transform, sampling) = draw.texture.map_or((glam::Affine2::IDENTITY, 0), |(texture, material)| {
-            (material.transform, sampling_bits(texture.sampler()))
+            (material.transform, sampling_bits(texture))
         });
         let matrix = transform.matrix2;
         Self {
@@ -161,8 +161,9 @@ impl DrawData {
     }
 }
 
-/// A sampler in bits, as in `shaders/shared/texture.wesl`.
-fn sampling_bits(sampler: Sampler) -> u32 {
+/// How a texture is sampled in bits, as in `shaders/shared/texture.wesl`.
+fn sampling_bits(texture: &Texture) -> u32 {
+    let sampler = texture.sampler();
     let wrap = |wrap| match wrap {
         Wrap::Repeat => 0,
         Wrap::MirroredRepeat => 1,
@@ -179,4 +180,5 @@ fn sampling_bits(sampler: Sampler) -> u32 {
         | linear(sampler.magnify, 16)
         | linear(sampler.minify, 32)
         | mip
+        | ((texture.levels().len() as u32) << 8)
 }

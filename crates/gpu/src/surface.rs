@@ -116,7 +116,8 @@ impl SurfaceLayouts {
             &[uniform(0, false), uniform(1, true), texture(2, wgpu::TextureSampleType::Depth)],
         );
         let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, both, true)));
-        let texture_layout = layout("texture", &[texture(0, wgpu::TextureSampleType::Float { filterable: false })]);
+        let texels = wgpu::TextureSampleType::Float { filterable: false };
+        let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
         let one_texel = |format| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("none"),
@@ -130,7 +131,8 @@ impl SurfaceLayouts {
             })
         };
         let no_depth = one_texel(wgpu::TextureFormat::Depth32Float).create_view(&Default::default());
-        let no_texture = texture_group(device, &texture_layout, &one_texel(wgpu::TextureFormat::Rgba8UnormSrgb));
+        let no_texels = one_texel(wgpu::TextureFormat::Rgba8UnormSrgb);
+        let no_texture = texture_group(device, &texture_layout, &[no_texels.clone(), no_texels]);
         Self {
             frame,
             scene,
@@ -141,19 +143,20 @@ impl SurfaceLayouts {
         }
     }
 
-    pub(crate) fn texture_bind_group(&self, gpu: &Context, texture: &wgpu::Texture) -> BindGroup {
-        texture_group(&gpu.device, &self.texture, texture)
+    pub(crate) fn texture_bind_group(&self, gpu: &Context, textures: &[wgpu::Texture; 2]) -> BindGroup {
+        texture_group(&gpu.device, &self.texture, textures)
     }
 }
 
-fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, texture: &wgpu::Texture) -> BindGroup {
+fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, textures: &[wgpu::Texture; 2]) -> BindGroup {
+    let views = textures.each_ref().map(|texture| texture.create_view(&Default::default()));
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("texture"),
         layout,
-        entries: &[wgpu::BindGroupEntry {
-            binding: 0,
-            resource: wgpu::BindingResource::TextureView(&texture.create_view(&Default::default())),
-        }],
+        entries: &[0, 1].map(|binding: u32| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(&views[binding as usize]),
+        }),
     })
 }
 
@@ -280,8 +283,8 @@ fn may_overflow(draw: &Draw<'_>, reach: glam::Vec3) -> bool {
     (0..4).any(|row| {
         let [x, y, z, w] = bound.map(|column| column[row]);
         let greatest = x * f64::from(reach.x) + y * f64::from(reach.y) + z * f64::from(reach.z) + w;
-        // Half of it, for rounding; written so that NaN may.
-        !(greatest < f64::from(f32::MAX) * 0.5)
+        // Half of it, for rounding.
+        greatest.is_nan() || greatest >= f64::from(f32::MAX) * 0.5
     })
 }
 

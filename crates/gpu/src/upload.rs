@@ -2,6 +2,7 @@
 //! scene's revision stays the same.
 
 use glam::Vec3;
+use pellucid_core::texture::MipLevel;
 use pellucid_core::{Scene, Texture};
 use wgpu::{BindGroup, BufferUsages, TextureUsages};
 
@@ -98,31 +99,39 @@ fn storage(gpu: &Context, label: &str, bytes: &[u8]) -> Result<wgpu::Buffer, Gpu
     Ok(buffer)
 }
 
-fn upload_texture(gpu: &Context, texture: &Texture) -> Result<wgpu::Texture, GpuError> {
-    let levels = texture.levels();
-    let size = wgpu::Extent3d { width: levels[0].width, height: levels[0].height, depth_or_array_layers: 1 };
+/// The full size, and all smaller levels one under the other; see `shaders/shared/texture.wesl`.
+fn upload_texture(gpu: &Context, texture: &Texture) -> Result<[wgpu::Texture; 2], GpuError> {
+    let (full_size, smaller) = texture.levels().split_at(1);
+    Ok([upload_levels(gpu, full_size)?, upload_levels(gpu, smaller)?])
+}
+
+fn upload_levels(gpu: &Context, levels: &[MipLevel]) -> Result<wgpu::Texture, GpuError> {
+    let width = levels.iter().map(|level| level.width).max().unwrap_or(1);
+    let height = levels.iter().map(|level| level.height).sum::<u32>().max(1);
     let uploaded = gpu.texture(&wgpu::TextureDescriptor {
-        label: Some("a texture"),
-        size,
-        mip_level_count: levels.len() as u32,
+        label: Some("a texture of the scene"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: wgpu::TextureFormat::Rgba8UnormSrgb,
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
     })?;
-    for (mip_level, level) in (0..).zip(levels) {
+    let mut top = 0;
+    for level in levels {
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
                 texture: &uploaded,
-                mip_level,
-                origin: wgpu::Origin3d::ZERO,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: top, z: 0 },
                 aspect: wgpu::TextureAspect::All,
             },
             level.texels.as_flattened(),
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
             wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
         );
+        top += level.height;
     }
     Ok(uploaded)
 }
