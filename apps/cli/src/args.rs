@@ -23,6 +23,8 @@ Examples:
   pellucid render model.glb -o model.png --opacity 0.4 --view right
   pellucid render @boxes:n=8 -o depth.png --resolve complexity
   pellucid info model.glb
+  pellucid compare @gallery -o report
+  pellucid verify
 
 Exit codes: 0 done, 1 failed, 2 the command line is wrong.";
 
@@ -32,6 +34,10 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Show what is in a scene, and how many layers lie behind the pixels of a view
     Info(Box<InfoArgs>),
+    /// Render a view with several techniques, and report side by side what they show, take and hold
+    Compare(Box<CompareArgs>),
+    /// Hold this device against the oracle: built-in scenes, exact techniques, resolves
+    Verify(VerifyArgs),
     /// List the built-in scenes and their parameters
     Scenes(ListArgs),
     /// List the techniques: how fragments are captured and ordered
@@ -96,6 +102,71 @@ pub(crate) struct InfoArgs {
 
     #[command(flatten)]
     pub(crate) capture: CaptureArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CompareArgs {
+    /// A file (.glb .gltf .obj .ply .stl), or a built-in: @name or @name:key=value,key=value
+    pub(crate) scene: OsString,
+
+    /// The folder for pictures, figures and report; made if only it is missing. Open its index.html in a browser
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+
+    /// What is compared, separated by commas: `unsorted`, which is blending in draw order, and names from `pellucid
+    /// techniques` [default: unsorted, and all that run on the backend but the oracle]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(compared_names()))]
+    pub(crate) techniques: Vec<String>,
+
+    /// What they are held against; only the oracle knows where pixels are ambiguous, and it is slow [default: the oracle
+    /// where it takes seconds, else the CPU renderer, which equals it]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) reference: Option<ReferenceArg>,
+
+    /// Colour behind everything: a CSS name, hex (#rgb, #rrggbb, #rrggbbaa), or none for a transparent picture
+    #[arg(long, value_name = "COLOUR", default_value = DEFAULT_BACKGROUND)]
+    pub(crate) background: String,
+
+    /// Say nothing but the table and errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+
+    #[command(flatten)]
+    pub(crate) device: DeviceArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct VerifyArgs {
+    /// An exact technique; can be given more than once [default: all that run on the backend but the oracle]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = PossibleValuesParser::new(exact_names()))]
+    pub(crate) technique: Vec<String>,
+
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    #[command(flatten)]
+    pub(crate) device: DeviceArgs,
+}
+
+/// What techniques run on.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Rendering")]
+pub(crate) struct DeviceArgs {
+    /// What renders; auto takes the CPU, and a real GPU if there is one
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    pub(crate) backend: Backend,
+
+    /// Threads; 0 is one for each core. The picture is the same on any number
+    #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
+    pub(crate) threads: String,
+
+    /// Bytes that a GPU capture may hold, such as 512M; the CPU holds one tile a thread and needs no bound
+    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
+    pub(crate) budget: Option<String>,
 }
 
 /// From where, and how large.
@@ -193,6 +264,15 @@ pub(crate) enum ShadingArg {
     Unlit,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ReferenceArg {
+    Oracle,
+    Cpu,
+}
+
+/// The name, among techniques, of blending in draw order on no device at all.
+pub(crate) const UNSORTED: &str = "unsorted";
+
 /// Dark and neutral, so that every colour of glass stands out before it.
 const DEFAULT_BACKGROUND: &str = "#1b1d22";
 
@@ -200,4 +280,12 @@ fn resolve_help() -> String {
     let width = Resolve::NAMES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let names = Resolve::NAMES.iter().map(|(name, meaning)| format!("\n  {name:width$}  {meaning}"));
     format!("What the ordered layers become [default: blend]:{}", names.collect::<String>())
+}
+
+fn compared_names() -> Vec<&'static str> {
+    [UNSORTED].into_iter().chain(Technique::ALL.map(Technique::name)).collect()
+}
+
+fn exact_names() -> Vec<&'static str> {
+    Technique::ALL.into_iter().filter(|technique| technique.is_exact()).map(Technique::name).collect()
 }

@@ -7,6 +7,7 @@
 mod args;
 mod camera;
 mod commands;
+mod devices;
 mod legend;
 mod plan;
 mod progress;
@@ -61,6 +62,8 @@ fn run(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Render(args) => commands::render::run(&plan::RenderPlan::new(*args)?),
         Command::Info(args) => commands::info::run(&plan::InfoPlan::new(*args)?),
+        Command::Compare(args) => commands::compare::run(&plan::ComparePlan::new(*args)?),
+        Command::Verify(args) => commands::verify::run(plan::VerifyPlan::new(args)?),
         Command::Scenes(args) => commands::scenes::run(args.json),
         Command::Techniques(args) => commands::techniques::run(args.json),
     }

@@ -1,5 +1,8 @@
 //! What a command line means: every value checked, defaults in place, nothing left to interpret but the scene.
 
+mod compare;
+mod verify;
+
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +15,9 @@ use crate::UsageError;
 use crate::args::{Backend, CaptureArgs, InfoArgs, RenderArgs, ShadingArg, ViewArgs};
 use crate::camera::CameraPlan;
 use crate::values;
+
+pub(crate) use compare::{ComparePlan, Compared};
+pub(crate) use verify::VerifyPlan;
 
 /// A picture or turntable to render.
 #[derive(Debug)]
@@ -71,7 +77,7 @@ pub(crate) struct CapturePlan {
 const MAX_FRAMES: u32 = 9999;
 
 /// More threads than any machine has cores; beyond it systems refuse to start them.
-const MAX_THREADS: u32 = 1024;
+pub(crate) const MAX_THREADS: u32 = 1024;
 
 impl RenderPlan {
     pub(crate) fn new(args: RenderArgs) -> anyhow::Result<Self> {
@@ -198,11 +204,11 @@ fn usage(message: String) -> anyhow::Error {
     UsageError(message).into()
 }
 
-fn option<T>(name: &str, text: &str, parse: impl Fn(&str) -> Result<T, values::Wrong>) -> anyhow::Result<T> {
+pub(crate) fn option<T>(name: &str, text: &str, parse: impl Fn(&str) -> Result<T, values::Wrong>) -> anyhow::Result<T> {
     parse(text).map_err(|wrong| usage(format!("{name} '{text}': {wrong}")))
 }
 
-fn optional<T>(
+pub(crate) fn optional<T>(
     name: &str,
     text: Option<&String>,
     parse: impl Fn(&str) -> Result<T, values::Wrong>,

@@ -40,10 +40,18 @@ pub(crate) struct Figures {
     rerenders: u32,
 }
 
+/// A timed part of a frame.
 #[derive(Debug, Serialize)]
-struct Step {
+pub(crate) struct Step {
     name: &'static str,
     ms: f64,
+}
+
+impl Step {
+    /// All of a frame, in order.
+    pub(crate) fn all(stats: &Stats) -> Vec<Self> {
+        stats.steps.iter().map(|step| Self { name: step.name, ms: step.ms }).collect()
+    }
 }
 
 /// A single picture.
@@ -95,7 +103,7 @@ impl From<&Stats> for Figures {
             fragments: stats.fragments,
             max_depth_complexity: stats.max_depth_complexity,
             mean_depth_complexity: stats.mean_depth_complexity,
-            steps: stats.steps.iter().map(|step| Step { name: step.name, ms: step.ms }).collect(),
+            steps: Step::all(stats),
             total_ms: stats.total_ms,
             peak_bytes: stats.peak_bytes,
             windows: stats.windows,

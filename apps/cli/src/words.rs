@@ -33,6 +33,15 @@ pub(crate) fn duration(ms: f64) -> String {
     }
 }
 
+/// An amount of memory at a glance: `853 B`, `12.4 KiB`, `1.2 GiB`.
+pub(crate) fn memory(bytes: u64) -> String {
+    const UNITS: [(u64, &str); 3] = [(1 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
+    match UNITS.iter().find(|(unit, _)| bytes >= *unit) {
+        Some((unit, name)) => format!("{:.1} {name}", bytes as f64 / *unit as f64),
+        None => format!("{bytes} B"),
+    }
+}
+
 /// `1 picture`, `2 pictures`.
 pub(crate) fn plural(count: u64, noun: &str) -> String {
     format!("{} {noun}{}", full_count(count), if count == 1 { "" } else { "s" })
@@ -62,6 +71,15 @@ mod tests {
             (12_345_678_901, "12,345,678,901", "12.3 G"),
         ] {
             assert_eq!((full_count(count).as_str(), short_count(count).as_str()), (full, short));
+        }
+    }
+
+    #[test]
+    fn amounts_of_memory() {
+        for (bytes, text) in
+            [(0, "0 B"), (1023, "1023 B"), (1536, "1.5 KiB"), (5 << 20, "5.0 MiB"), (3 << 29, "1.5 GiB")]
+        {
+            assert_eq!(memory(bytes), text);
         }
     }
 

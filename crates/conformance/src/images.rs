@@ -32,6 +32,21 @@ impl Comparison {
     pub fn passes(&self) -> bool {
         self.unexplained == 0 && self.ambiguous as f64 <= (AMBIGUOUS_SHARE * self.covered as f64).max(1.0)
     }
+
+    /// Counts a pixel that differs by so much.
+    pub(crate) fn count(&mut self, x: u32, y: u32, difference: f32, covered: bool, ambiguous: bool) {
+        self.covered += u64::from(covered);
+        if difference > self.worst.map_or(0.0, |(_, _, worst)| worst) {
+            self.worst = Some((x, y, difference));
+        }
+        *if difference <= TOLERANCE {
+            &mut self.agreeing
+        } else if ambiguous {
+            &mut self.ambiguous
+        } else {
+            &mut self.unexplained
+        } += 1;
+    }
 }
 
 /// Compares `image` with the oracle's `expected`, of the same size; `ambiguous` and `covered` say so of each pixel.
@@ -43,18 +58,7 @@ pub fn compare(expected: &Image, ambiguous: &[bool], covered: impl Fn(u32, u32) 
     let mut comparison = Comparison::default();
     for (i, (&want, &have)) in expected.pixels().iter().zip(image.pixels()).enumerate() {
         let (x, y) = (i as u32 % expected.width(), i as u32 / expected.width());
-        comparison.covered += u64::from(covered(x, y));
-        let difference = difference(want, have);
-        if difference > comparison.worst.map_or(0.0, |(_, _, worst)| worst) {
-            comparison.worst = Some((x, y, difference));
-        }
-        if difference <= TOLERANCE {
-            comparison.agreeing += 1;
-        } else if ambiguous[i] {
-            comparison.ambiguous += 1;
-        } else {
-            comparison.unexplained += 1;
-        }
+        comparison.count(x, y, difference(want, have), covered(x, y), ambiguous[i]);
     }
     comparison
 }

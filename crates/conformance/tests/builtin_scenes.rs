@@ -1,49 +1,60 @@
 //! Every built-in scene: the CPU renderer equals the oracle, at any number of threads, every time.
 
+use std::collections::BTreeSet;
+
 use glam::Vec3;
 use pellucid::core::oracle;
 use pellucid::core::view::direction;
-use pellucid::{Camera, Renderer, Resolve, Scene, View, builtin};
+use pellucid::{Camera, Renderer, Resolve, Scene, Technique, View, builtin};
 use pellucid_conformance::layers;
+use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
 use pellucid_cpu::{CpuRenderer, simd};
 
-/// Smaller forms of the scenes whose usual size would keep the oracle busy for minutes.
-fn small(name: &str) -> String {
-    match name {
-        "boxes" => "@boxes:n=4".into(),
-        "hairball" => "@hairball:strands=120".into(),
-        "spheres" => "@spheres:n=40".into(),
-        "tree" => "@tree:leaves=300".into(),
-        "grids" => "@grids:layers=5,tessellation=12".into(),
-        "teapot" => "@teapot:tessellation=5".into(),
-        other => format!("@{other}"),
-    }
-}
-
-fn scenes() -> impl Iterator<Item = (String, Scene)> {
-    builtin::all().iter().map(|scene| {
-        let source = small(scene.name);
-        let loaded = pellucid::load(&source).unwrap_or_else(|error| panic!("{source}: {error}"));
-        (source, loaded.scene)
-    })
+/// Every scene of the suite once.
+fn scenes() -> impl Iterator<Item = (&'static str, Scene)> {
+    let sources: BTreeSet<&str> = CASES.iter().map(|case| case.source).collect();
+    sources.into_iter().map(|source| (source, pellucid::load(source).unwrap().scene))
 }
 
 #[test]
-fn cpu_equals_oracle_on_every_scene() {
+fn every_built_in_scene_is_in_the_suite() {
+    for scene in builtin::all() {
+        let is_this = |source: &str| source.strip_prefix('@').and_then(|s| s.split(':').next()) == Some(scene.name);
+        assert!(CASES.iter().any(|case| is_this(case.source)), "@{}", scene.name);
+    }
+}
+
+/// Stricter than `pellucid verify`: bit for bit, and so are pictures.
+#[test]
+fn cpu_equals_oracle_in_every_case() {
     let renderer = Renderer::new();
-    for (source, scene) in scenes() {
-        for opacity in [1.0, 0.4] {
-            let view = View::of(&scene).size(64, 36).opacity(opacity);
-            let capture = oracle::capture(&scene, &view).unwrap();
-            let gathered = layers::gather(&renderer, &scene, &view).unwrap();
-            if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
-                panic!("{source}, opacity {opacity}: {difference}");
-            }
-            assert!(!gathered.fragments.is_empty() || gathered.opaque.iter().any(Option::is_some), "{source} is empty");
-            for resolve in [Resolve::Blend, Resolve::Gelly, Resolve::Complexity(0)] {
+    for case in CASES {
+        let Prepared { scene, view, capture } = case.prepare().unwrap();
+        let gathered = layers::gather(&renderer, &scene, &view).unwrap();
+        if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
+            panic!("{case:?}: {difference}");
+        }
+        let sees_something = !gathered.fragments.is_empty() || gathered.opaque.iter().any(Option::is_some);
+        assert!(sees_something, "{case:?} is empty");
+        for check in Check::ALL {
+            if let Check::Picture(resolve) = check {
                 let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, resolve);
                 let frame = renderer.render(&scene, &view, resolve).unwrap();
-                assert!(expected == frame.image, "{source}, {resolve}, opacity {opacity}");
+                assert!(expected == frame.image, "{case:?}, {resolve}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_oracle_passes_its_own_suite_and_so_does_the_cpu() {
+    for technique in [Technique::Oracle, Technique::Cpu] {
+        let candidate = Candidate::new(technique, Renderer::new());
+        for case in CASES.iter().step_by(5) {
+            let prepared = case.prepare().unwrap();
+            for check in Check::ALL {
+                let comparison = prepared.run(check, &candidate).unwrap();
+                assert!(comparison.passes() && comparison.ambiguous == 0, "{case:?}, {check}: {comparison:?}");
             }
         }
     }

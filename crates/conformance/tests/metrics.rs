@@ -3,7 +3,8 @@
 
 use glam::Vec4;
 use pellucid::Image;
-use pellucid_conformance::metrics::{self, Shown, flip};
+use pellucid_conformance::metrics::flip::{PIXELS_PER_DEGREE, map};
+use pellucid_conformance::metrics::{self, Shown};
 
 /// Name, PSNR in decibels and SSIM by scikit-image 0.26, mean and greatest FLIP by flip-evaluator 1.7.
 const EXPECTED: [(&str, f64, f64, f64, f32); 5] = [
@@ -32,7 +33,7 @@ fn stored_pairs_measure_as_elsewhere() {
         // The other one computes in single precision.
         let have = metrics::flip(&reference, &picture);
         assert!((have - flip_mean).abs() < 1e-4 * flip_mean.max(0.01), "{name}: FLIP {have}, not {flip_mean}");
-        let map = flip::map(&reference, &picture, flip::PIXELS_PER_DEGREE);
+        let map = map(&reference, &picture, PIXELS_PER_DEGREE);
         let have = map.into_iter().fold(0.0, f32::max);
         assert!((have - flip_greatest).abs() < 1e-3, "{name}: greatest FLIP {have}, not {flip_greatest}");
     }

@@ -1,9 +1,11 @@
 //! What each command does.
 
+pub(crate) mod compare;
 pub(crate) mod info;
 pub(crate) mod render;
 pub(crate) mod scenes;
 pub(crate) mod techniques;
+pub(crate) mod verify;
 
 use pellucid::Stats;
 

@@ -101,7 +101,7 @@ impl Job<'_> {
         let Frame { mut image, stats } = self.renderer.render(self.scene, view, self.plan.resolve)?;
         if let Resolve::Complexity(asked) = self.plan.resolve {
             let full_scale = heat_map::full_scale(asked, stats.max_depth_complexity);
-            if !legend::draw(&mut image, full_scale, stats.max_depth_complexity > full_scale) {
+            if !legend::draw(&mut image, legend::FRAGMENTS, full_scale, stats.max_depth_complexity > full_scale) {
                 let scale = format!("{}: too small for a legend; the scale is {}", path.display(), words(full_scale));
                 self.say(|| terminal::note(&scale));
             }

@@ -13,7 +13,9 @@ use pellucid::core::heat_map;
 
 use canvas::{Align, Canvas};
 
-const TITLE: &str = "fragments per pixel";
+/// Titles: what the colours count.
+pub(crate) const FRAGMENTS: &str = "fragments per pixel";
+pub(crate) const ERROR: &str = "error, in 1/255";
 /// Under the swatch of what is beyond the scale.
 const BEYOND: &str = "more";
 
@@ -38,10 +40,10 @@ struct Layout {
     tick: u32,
 }
 
-/// Draws the legend of a scale that ends at `full_scale`, with a swatch for numbers beyond it if there are any.
+/// Draws the legend of a scale of that title that ends at `full_scale`, with a swatch for numbers beyond it if there are any.
 ///
 /// Returns whether there was room for it; otherwise the picture is as it was.
-pub(crate) fn draw(image: &mut Image, full_scale: u32, has_beyond: bool) -> bool {
+pub(crate) fn draw(image: &mut Image, title: &str, full_scale: u32, has_beyond: bool) -> bool {
     let Some(layout) = Layout::for_picture(image.width(), image.height(), has_beyond) else {
         return false;
     };
@@ -52,8 +54,22 @@ pub(crate) fn draw(image: &mut Image, full_scale: u32, has_beyond: bool) -> bool
     let mut canvas = Canvas::new(image, (left, top), (width, height), layout.zoom);
     canvas.darken(SHINES_THROUGH);
     canvas.outline((0, 0), (width, height), FRAME_COLOR);
-    layout.draw(&mut canvas, full_scale);
+    layout.draw(&mut canvas, title, full_scale);
     true
+}
+
+/// Writes a name into the upper left corner of a part of a picture, from column `left` on and `width` wide, if it fits.
+pub(crate) fn label(image: &mut Image, name: &str, (left, width): (u32, u32)) {
+    let font = &FONT_9X15;
+    let characters = name.len() as u32;
+    let (padding, zoom) = (4, (image.height() / 600).max(1));
+    let size = (characters * font.character_size.width + 2 * padding, font.character_size.height + 2);
+    if size.0 * zoom + 2 * padding > width || 3 * size.1 * zoom > image.height() {
+        return;
+    }
+    let mut canvas = Canvas::new(image, (left + padding * zoom, padding * zoom), size, zoom);
+    canvas.darken(SHINES_THROUGH);
+    canvas.text(name, (padding, 1), Align::Left, font, TITLE_COLOR);
 }
 
 impl Layout {
@@ -108,10 +124,10 @@ impl Layout {
         self.bar_top() + self.bar_height + self.tick + 2
     }
 
-    fn draw(&self, canvas: &mut Canvas<'_>, full_scale: u32) {
+    fn draw(&self, canvas: &mut Canvas<'_>, title: &str, full_scale: u32) {
         let Self { padding: left, bar_width, bar_height, .. } = *self;
         let character_width = self.font.character_size.width;
-        canvas.text(TITLE, (left, self.padding / 2), Align::Left, self.font, TITLE_COLOR);
+        canvas.text(title, (left, self.padding / 2), Align::Left, self.font, TITLE_COLOR);
 
         // Each number from 0 on has an equal share of the bar.
         let share = |x: u32| u64::from(x) * (u64::from(full_scale) + 1) / u64::from(bar_width);
@@ -160,7 +176,7 @@ mod tests {
                 for (full_scale, beyond) in [(1, false), (23, true), (1_000_000, false), (u32::MAX - 1, true)] {
                     let empty = Image::filled(width, height, Vec4::ONE);
                     let mut image = empty.clone();
-                    let is_drawn = draw(&mut image, full_scale, beyond);
+                    let is_drawn = draw(&mut image, FRAGMENTS, full_scale, beyond);
                     assert_eq!(is_drawn, image != empty, "{width} x {height}");
                     drawn += u32::from(is_drawn);
                 }

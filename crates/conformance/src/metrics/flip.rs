@@ -101,7 +101,10 @@ fn derivatives(pixels_per_degree: f64) -> (Vec<Vec4>, Vec<Vec4>) {
         let weights: Vec<f64> = (-radius..=radius).map(|x| weight(f64::from(x))).collect();
         let positive: f64 = weights.iter().filter(|&&w| w > 0.0).sum();
         let negative: f64 = -weights.iter().filter(|&&w| w < 0.0).sum::<f64>();
-        weights.into_iter().map(|w| if w > 0.0 { w / positive } else { w / negative.max(f64::MIN_POSITIVE) } as f32).collect()
+        weights
+            .into_iter()
+            .map(|w| if w > 0.0 { w / positive } else { w / negative.max(f64::MIN_POSITIVE) } as f32)
+            .collect()
     };
     let gaussian = |x: f64| (-x * x / (2.0 * sigma * sigma)).exp();
     let smooth = normalised(&gaussian);
@@ -135,11 +138,7 @@ fn convolved(planes: Vec<Vec4>, (width, height): (usize, usize), along: &[Vec4],
 /// Gives the differences that matter most of the scale.
 fn redistributed(difference: f32, greatest: f32) -> f32 {
     let knee = PC * greatest;
-    if difference < knee {
-        difference * PT / knee
-    } else {
-        PT + (difference - knee) / (greatest - knee) * (1.0 - PT)
-    }
+    if difference < knee { difference * PT / knee } else { PT + (difference - knee) / (greatest - knee) * (1.0 - PT) }
 }
 
 fn feature_difference(a: [f32; 2], b: [f32; 2]) -> f32 {

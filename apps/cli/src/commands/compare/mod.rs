@@ -1,0 +1,101 @@
+//! `pellucid compare`: one view rendered with several techniques, what they show, take and hold, and a report to look at.
+//!
+//! In order: the reference (`reference`), what its layers alone show (`observation`), each technique's picture and
+//! figures (`measure`), and what is said of them: `document` as JSON, CSV and text, `report` as a page.
+
+mod document;
+mod folder;
+mod measure;
+mod observation;
+mod pictures;
+mod reference;
+mod report;
+mod spots;
+
+use anyhow::Context;
+use pellucid::Technique;
+
+use crate::args::UNSORTED;
+use crate::commands::{warn_about, warn_about_dropped};
+use crate::plan::{ComparePlan, Compared};
+use crate::progress::Progress;
+use crate::report::to_json;
+use crate::{legend, terminal};
+use document::Document;
+use folder::Folder;
+use measure::{Measured, measure};
+use observation::Observation;
+use reference::Reference;
+
+pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
+    let folder = Folder::open(&plan.output)?;
+    let progress = Progress::new(None, plan.quiet);
+    progress.stage("loading");
+    let loaded = plan.scene.load()?;
+    let view = plan.view.of(&loaded.scene)?;
+    let scene = &loaded.scene;
+    if !plan.quiet {
+        progress.suspend(|| warn_about(&loaded.warnings));
+    }
+
+    let named: Vec<Technique> = plan.compared.iter().filter_map(|compared| compared.technique()).collect();
+    let is_usual = |technique| plan.compared.is_empty() && technique != Technique::Oracle;
+    let devices = plan.device.open(&named, is_usual)?;
+    let mut compared = plan.compared.clone();
+    if compared.is_empty() {
+        compared.push(Compared::Unsorted);
+        compared.extend(devices.techniques.iter().map(|&technique| Compared::Technique(technique)));
+    }
+
+    let technique = plan.reference.unwrap_or_else(|| reference::usual(scene, &view));
+    progress.stage(format!("rendering the reference ({technique})"));
+    let reference = Reference::capture(technique, plan.device.cpu(), scene, &view)?;
+    progress.stage("looking at its layers");
+    let observation = Observation::of(&reference, scene, &view)?;
+
+    folder.save("reference.png", reference.image())?;
+    let mut measured: Vec<Measured> = Vec::new();
+    let mut renderer = devices.renderer;
+    for compared in compared {
+        progress.stage(format!("rendering: {}", compared.name()));
+        if let Compared::Technique(technique) = compared {
+            renderer = renderer.technique(technique);
+        }
+        let result = measure(compared, &renderer, scene, &view, &reference, &observation);
+        let result = result.with_context(|| format!("technique '{}' could not render this view", compared.name()))?;
+        folder.save(&format!("{}.png", compared.name()), &result.image)?;
+        folder.save(&format!("{}-error.png", compared.name()), &pictures::error_map(&result))?;
+        measured.push(result);
+    }
+
+    progress.stage("writing");
+    // Hardware blending where it was rendered, else its equal.
+    let left = measured.iter().find(|measured| is_unsorted(measured.compared));
+    let (name, unsorted) =
+        left.map_or((UNSORTED, &observation.unsorted), |measured| (measured.compared.name(), &measured.image));
+    let exact = reference.technique().name();
+    folder.save("split.png", &pictures::split((unsorted, name), (reference.image(), exact)))?;
+    folder.save("complexity.png", &pictures::complexity(&observation, legend::FRAGMENTS))?;
+    folder.save("layers.png", &observation.layers.strip())?;
+
+    let document = Document::new(&plan.scene.to_string(), scene, &view, &reference, &observation, &measured)?;
+    let json = to_json(&document)?;
+    folder.write("compare.json", json.as_bytes())?;
+    folder.write("compare.csv", document.to_csv().as_bytes())?;
+    folder.write("index.html", report::page(&document, &folder)?.as_bytes())?;
+    drop(progress);
+
+    terminal::print(&document.to_text())?;
+    if !plan.quiet {
+        warn_about_dropped(reference.stats());
+        if let Some(reason) = devices.without_gpu {
+            terminal::note(&format!("GPU techniques were left out: {reason}"));
+        }
+        terminal::note(&format!("{}: open it in a browser", plan.output.join("index.html").display()));
+    }
+    Ok(())
+}
+
+fn is_unsorted(compared: Compared) -> bool {
+    compared.technique().is_some_and(|technique| technique == Technique::Alpha)
+}
