@@ -16,11 +16,13 @@ pub enum Technique {
     Alpha,
     /// Linearized layered fragment buffer (LFB chapter, section 20.4).
     Linear,
+    /// Linked list of fragments for each pixel (LFB chapter, section 20.3).
+    List,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 4] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Linear];
+    pub const ALL: [Self; 5] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Linear, Self::List];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -29,6 +31,7 @@ impl Technique {
             Self::Oracle => "oracle",
             Self::Alpha => "alpha",
             Self::Linear => "linear",
+            Self::List => "list",
         }
     }
 
@@ -36,14 +39,14 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
-            Self::Alpha | Self::Linear => "gpu",
+            Self::Alpha | Self::Linear | Self::List => "gpu",
         }
     }
 
     /// Whether it captures every fragment and orders all of them.
     pub fn is_exact(self) -> bool {
         match self {
-            Self::Cpu | Self::Oracle | Self::Linear => true,
+            Self::Cpu | Self::Oracle | Self::Linear | Self::List => true,
             Self::Alpha => false,
         }
     }
@@ -51,7 +54,7 @@ impl Technique {
     /// Passes over the geometry.
     pub fn passes(self) -> &'static str {
         match self {
-            Self::Cpu | Self::Oracle | Self::Alpha => "1",
+            Self::Cpu | Self::Oracle | Self::Alpha | Self::List => "1",
             Self::Linear => "2",
         }
     }
@@ -63,6 +66,7 @@ impl Technique {
             Self::Oracle => "32 B x fragments",
             Self::Alpha => "8 B x pixels",
             Self::Linear => "4 B x pixels + 16 B x fragments",
+            Self::List => "8 B x pixels + 20 B x fragments",
         }
     }
 
@@ -73,6 +77,7 @@ impl Technique {
             Self::Oracle => "tests every triangle against every pixel; slow, the reference of all others",
             Self::Alpha => "blends in draw order without sorting; wrong on purpose, a yardstick",
             Self::Linear => "counts fragments, allocates exactly as much, captures and sorts pixel by pixel",
+            Self::List => "links the fragments of each pixel, in one pass; repeats it if there was too little room",
         }
     }
 }

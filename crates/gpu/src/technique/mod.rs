@@ -4,7 +4,9 @@
 //! [`Frame::memory`], which keeps them by name and counts their bytes. The per-frame half is [`Frame`].
 
 mod alpha;
+mod growth;
 mod linear;
+mod list;
 
 use pellucid_core::Technique;
 use wgpu::BindGroupLayout;
@@ -43,6 +45,7 @@ pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, technique: Technique) -> 
     match technique {
         Technique::Alpha => Ok(Box::new(alpha::Alpha::new(gpu, layouts))),
         Technique::Linear => Ok(Box::new(linear::Linear::new(gpu, layouts))),
+        Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
         Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
     }
 }

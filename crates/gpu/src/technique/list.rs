@@ -1,0 +1,146 @@
+//! Linked lists of fragments, one for each pixel (Yang et al. 2010; LFB chapter, section 20.3). Twin:
+//! `shaders/technique/list.wesl`.
+//!
+//! One pass over the geometry: a global atomic counter hands out nodes, an atomic exchange of the pixel's head pointer puts
+//! each in front of its list. How many nodes there will be is not known before; the chapter leaves open to count first,
+//! to lose fragments, or to render again. Here room is made by the last frame's need, and rendered again where it fails.
+//!
+//! Beside its head pointer each pixel counts its fragments, which the chapter does not: one atomic addition more for a
+//! fragment, next to the word that is exchanged anyway. Rejected: to walk the list for its length, in every pass anew. The
+//! count also goes on when there is no room left, so that a window that has to be split is split where it must be, at once.
+
+use pellucid_core::primitive::Pass;
+use wgpu::{BindGroupLayout, ShaderStages};
+
+use super::growth::{KnownNeeds, STUCK, most_that_fits};
+use super::{Capture, Layouts, Outcome};
+use crate::frame::Frame;
+use crate::memory::{Estimate, Window};
+use crate::pass::ordered::{LfbShaders, OrderedPasses};
+use crate::readback::read_buffer;
+use crate::surface::{SurfacePass, SurfacePipelines, depth_state, storage_entry};
+use crate::{Context, GpuError, shaders};
+
+/// Bytes of a stored fragment.
+const FRAGMENT_BYTES: u64 = 16;
+/// Bytes of a link.
+const NEXT_BYTES: u64 = 4;
+/// Head pointer and counter of a pixel, in words.
+const HEAD_WORDS: u64 = 2;
+
+const HEADS: &str = "heads";
+const NEXTS: &str = "nexts";
+const FRAGMENTS: &str = "fragments";
+
+/// Long-lived half.
+#[derive(Debug)]
+pub(crate) struct List {
+    layout: BindGroupLayout,
+    capture: SurfacePipelines,
+    ordered: OrderedPasses,
+    estimate: Estimate,
+    known: KnownNeeds,
+}
+
+impl List {
+    pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
+        let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
+        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("list"),
+            entries: &[0, 1, 2].map(|binding| storage_entry(binding, visibility, false)),
+        });
+        let capture = SurfacePass {
+            label: "main render",
+            wgsl: shaders::LIST,
+            plain: "capture",
+            varied: "capture_varied",
+            ignores_color: false,
+            targets: &[],
+            depth_stencil: depth_state(false, false),
+            own_layout: Some(&layout),
+        };
+        let ordered_shaders =
+            LfbShaders { sort: shaders::SORT_LIST, resolve: shaders::RESOLVE_LIST, gather: shaders::GATHER_LIST };
+        Self {
+            capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
+            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
+            layout,
+            estimate: Estimate::default(),
+            known: KnownNeeds::default(),
+        }
+    }
+
+    /// All buffers of a window with so many pixels and nodes.
+    fn needs(pixels: u64, nodes: u64) -> [(&'static str, u64); 3] {
+        [(HEADS, (pixels * HEAD_WORDS + 1) * 4), (NEXTS, nodes * NEXT_BYTES), (FRAGMENTS, nodes * FRAGMENT_BYTES)]
+    }
+
+    /// Captures with room for so many nodes; says how many there are, and, if there was room for them, where.
+    fn capture(
+        &mut self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        room: u64,
+    ) -> Result<(wgpu::Buffer, wgpu::BindGroup, u32, bool), GpuError> {
+        let (gpu, pixels) = (frame.gpu, window.pixels());
+        let needs = Self::needs(pixels, room);
+        frame.memory.make_room(&needs);
+        let [heads, nexts, fragments] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
+        let (heads, nexts, fragments) = (heads?, nexts?, fragments?);
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("list"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: heads.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: nexts.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: fragments.as_entire_binding() },
+            ],
+        });
+        frame.zero("zero", &heads, needs[0].1)?;
+        let mut pass = frame.capture_pass("main render", window)?;
+        pass.set_bind_group(3, &group, &[]);
+        frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.capture);
+        drop(pass);
+        let nodes: u32 = read_buffer(frame, &heads, pixels * HEAD_WORDS, 1)?[0];
+        let there_is = (nexts.size() / NEXT_BYTES).min(fragments.size() / FRAGMENT_BYTES);
+        Ok((heads, group, nodes, u64::from(nodes) <= there_is))
+    }
+
+    /// Parts of a window that fit, now that it is known how many fragments each pixel has.
+    fn split(&mut self, frame: &mut Frame<'_>, window: Window, heads: &wgpu::Buffer) -> Result<Outcome, GpuError> {
+        let words: Vec<u32> = read_buffer(frame, heads, 0, window.pixels() * HEAD_WORDS)?;
+        let counts: Vec<u32> = words.into_iter().skip(1).step_by(HEAD_WORDS as usize).collect();
+        let fits =
+            |pixels, nodes| nodes < u64::from(STUCK) && frame.memory.fits(frame.gpu, &Self::needs(pixels, nodes));
+        let parts =
+            window.parts(&counts, fits).map_err(|nodes| frame.memory.refusal(frame.gpu, &Self::needs(1, nodes)))?;
+        self.known.learn(window, &counts, &parts, |counts| counts.iter().map(|&count| u64::from(count)).sum());
+        Ok(Outcome::Split(parts))
+    }
+}
+
+impl Capture for List {
+    fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
+        let (gpu, pixels) = (frame.gpu, window.pixels());
+        let known = self.known.take(window);
+        let wanted = known.unwrap_or_else(|| self.estimate.fragments(&window));
+        let Some(mut room) = most_that_fits(wanted, |nodes| frame.memory.fits(gpu, &Self::needs(pixels, nodes))) else {
+            return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
+        };
+        loop {
+            let (heads, group, nodes, is_whole) = self.capture(frame, window, room)?;
+            if known.is_none() && nodes < STUCK {
+                self.estimate.learn(&window, nodes.into());
+            }
+            if is_whole {
+                self.ordered.record(frame, window, &group)?;
+                return Ok(Outcome::Done);
+            }
+            frame.rerenders += 1;
+            room = nodes.into();
+            if nodes >= STUCK || !frame.memory.fits(gpu, &Self::needs(pixels, room)) {
+                return self.split(frame, window, &heads);
+            }
+        }
+    }
+}
