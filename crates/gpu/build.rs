@@ -2,6 +2,9 @@
 //!
 //! A pass that imports `package::lfb` is written once for all layered fragment buffers; it is linked once with each
 //! technique that is one, under the name `PASS_TECHNIQUE`. A technique is one if it defines `fragment_count`.
+//!
+//! The LFB for other people's shaders, `shaders/lfb`, is linked for each payload: to add fragments, to read them, and with
+//! the pass that sorts.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -11,7 +14,8 @@ use std::{env, fs};
 
 use wesl::{CompileOptions, FileResolver, ModulePath, ResolveError, Resolver, Wesl};
 
-/// Takes `package::lfb` for another module.
+/// Takes `package::lfb` for another module; and if that is not a technique, what the renderer's own passes know of frame,
+/// picture and fragment for that module too.
 struct LfbResolver {
     files: FileResolver,
     lfb: Option<ModulePath>,
@@ -21,6 +25,10 @@ impl LfbResolver {
     fn real<'a>(&'a self, path: &'a ModulePath) -> &'a ModulePath {
         match &self.lfb {
             Some(lfb) if path.components == ["lfb"] => lfb,
+            Some(lfb) if lfb.components[0] == "lfb" => match path.components.as_slice() {
+                [folder, stem] if folder == "shared" && ["frame", "picture", "fragment"].contains(&stem.as_str()) => lfb,
+                _ => path,
+            },
             _ => path,
         }
     }
@@ -62,14 +70,29 @@ fn main() {
             }
         }
     }
+    for words in 1..=4 {
+        for (name, folder, stem, read_only) in [
+            ("LFB_CAPTURE", "lfb", "module", false),
+            ("LFB_READ", "lfb", "module", true),
+            ("LFB_SORT", "pass", "sort", false),
+        ] {
+            linked.insert(format!("{name}_{words}"), link_interface(folder, stem, words, read_only));
+        }
+    }
+    linked.insert("LFB_CHECK".to_owned(), link_interface("lfb", "check", 1, false));
 
     let mut constants = String::new();
     for (name, wgsl) in &linked {
         writeln!(constants, "pub(crate) const {name}: &str = r####\"{wgsl}\"####;").expect("strings take all");
     }
     let names: Vec<String> = linked.keys().map(|name| format!("(\"{name}\", {name})")).collect();
-    writeln!(constants, "/// All of them, by name.\npub const ALL: [(&str, &str); {}] = [{}];", names.len(), names.join(", "))
-        .expect("strings take all");
+    writeln!(
+        constants,
+        "/// All of them, by name.\npub const ALL: [(&str, &str); {}] = [{}];",
+        names.len(),
+        names.join(", ")
+    )
+    .expect("strings take all");
     let folder = env::var_os("OUT_DIR").expect("cargo sets it");
     fs::write(Path::new(&folder).join("linked_shaders.rs"), constants).expect("the build folder can be written to");
 }
@@ -87,20 +110,36 @@ fn sources(folder: &str) -> BTreeMap<String, String> {
     sources
 }
 
-fn link(folder: &str, stem: &str, lfb: Option<(&String, bool)>) -> String {
-    let module = |folder: &str, stem: &str| -> ModulePath {
-        format!("package::{folder}::{stem}").parse().expect("stems are identifiers")
-    };
-    let resolver = LfbResolver {
-        files: FileResolver::new("shaders"),
-        lfb: lfb.map(|(technique, _)| module("technique", technique)),
-    };
+fn link(folder: &str, stem: &str, technique: Option<(&String, bool)>) -> String {
+    let random_access = technique.is_some_and(|(_, random_access)| random_access);
+    let lfb = technique.map(|(stem, _)| path("technique", stem));
+    compile(&path(folder, stem), lfb, &[("random_access", random_access)])
+}
+
+/// Links with the LFB that has payloads of so many words.
+fn link_interface(folder: &str, stem: &str, words: u32, read_only: bool) -> String {
+    let payload = |n| (["payload_1", "payload_2", "payload_3", "payload_4"][n as usize - 1], n == words);
+    let features =
+        [("random_access", true), ("read_only", read_only), payload(1), payload(2), payload(3), payload(4)];
+    compile(&path(folder, stem), Some(path("lfb", "stored")), &features)
+}
+
+fn path(folder: &str, stem: &str) -> ModulePath {
+    format!("package::{folder}::{stem}").parse().expect("stems are identifiers")
+}
+
+fn compile(root: &ModulePath, lfb: Option<ModulePath>, features: &[(&str, bool)]) -> String {
+    let with = lfb.as_ref().map_or(String::new(), |lfb| format!(" with {lfb}"));
+    let resolver = LfbResolver { files: FileResolver::new("shaders"), lfb };
     let mut compiler = Wesl::new("shaders").set_custom_resolver(resolver);
-    // The one validator that counts is naga's, in the tests.
-    compiler.set_options(CompileOptions { validate: false, ..CompileOptions::default() });
-    compiler.set_feature("random_access", lfb.is_some_and(|(_, random_access)| random_access));
-    match compiler.compile(&module(folder, stem)) {
+    // The one validator that counts is naga's, in the tests. The interface for other people's shaders has no entry point.
+    let keep_root = root.components == ["lfb", "module"];
+    compiler.set_options(CompileOptions { validate: false, keep_root, ..CompileOptions::default() });
+    for &(feature, is_on) in features {
+        compiler.set_feature(feature, is_on);
+    }
+    match compiler.compile(root) {
         Ok(result) => result.to_string(),
-        Err(error) => panic!("shaders/{folder}/{stem}.wesl{}: {error}", lfb.map_or(String::new(), |(name, _)| format!(" with {name}"))),
+        Err(error) => panic!("{root}{with}: {error}"),
     }
 }

@@ -42,6 +42,8 @@ pub struct Stats {
     pub windows: u32,
     /// Captures repeated because an estimate of their size was too small.
     pub rerenders: u32,
+    /// Pixels with more layers than the frame was allowed to peel: the picture is not exact there.
+    pub cut_pixels: u64,
 }
 
 impl Stats {
@@ -62,7 +64,13 @@ impl Stats {
             peak_bytes: 0,
             windows: 1,
             rerenders: 0,
+            cut_pixels: 0,
         }
+    }
+
+    /// Whether every fragment was captured and ordered.
+    pub fn is_exact(&self) -> bool {
+        self.technique.is_exact() && self.cut_pixels == 0
     }
 }
 

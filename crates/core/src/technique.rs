@@ -14,15 +14,19 @@ pub enum Technique {
     Oracle,
     /// Unsorted hardware blending in draw order: wrong on purpose.
     Alpha,
+    /// Depth peeling: front to back, one layer a pass (Everitt 2001).
+    Peel,
     /// Linearized layered fragment buffer (LFB chapter, section 20.4).
     Linear,
     /// Linked list of fragments for each pixel (LFB chapter, section 20.3).
     List,
+    /// As much room for every pixel as the deepest needs (Crassin 2010).
+    ABuffer,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 5] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Linear, Self::List];
+    pub const ALL: [Self; 7] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Peel, Self::Linear, Self::List, Self::ABuffer];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -30,8 +34,10 @@ impl Technique {
             Self::Cpu => "cpu",
             Self::Oracle => "oracle",
             Self::Alpha => "alpha",
+            Self::Peel => "peel",
             Self::Linear => "linear",
             Self::List => "list",
+            Self::ABuffer => "abuffer",
         }
     }
 
@@ -39,14 +45,14 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
-            Self::Alpha | Self::Linear | Self::List => "gpu",
+            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer => "gpu",
         }
     }
 
     /// Whether it captures every fragment and orders all of them.
     pub fn is_exact(self) -> bool {
         match self {
-            Self::Cpu | Self::Oracle | Self::Linear | Self::List => true,
+            Self::Cpu | Self::Oracle | Self::Peel | Self::Linear | Self::List | Self::ABuffer => true,
             Self::Alpha => false,
         }
     }
@@ -54,7 +60,8 @@ impl Technique {
     /// Passes over the geometry.
     pub fn passes(self) -> &'static str {
         match self {
-            Self::Cpu | Self::Oracle | Self::Alpha | Self::List => "1",
+            Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer => "1",
+            Self::Peel => "layers + 1",
             Self::Linear => "2",
         }
     }
@@ -65,8 +72,10 @@ impl Technique {
             Self::Cpu => "16 B x vertices + 96 B x visible triangles + threads x fragments of a tile x 18 B",
             Self::Oracle => "32 B x fragments",
             Self::Alpha => "8 B x pixels",
+            Self::Peel => "44 B x pixels, 60 B for gelly and blend:corrected",
             Self::Linear => "4 B x pixels + 16 B x fragments",
             Self::List => "8 B x pixels + 20 B x fragments",
+            Self::ABuffer => "4 B x pixels + 16 B x pixels x greatest depth complexity",
         }
     }
 
@@ -76,8 +85,10 @@ impl Technique {
             Self::Cpu => "bins triangles into tiles, captures, sorts and resolves tile by tile on all cores",
             Self::Oracle => "tests every triangle against every pixel; slow, the reference of all others",
             Self::Alpha => "blends in draw order without sorting; wrong on purpose, a yardstick",
+            Self::Peel => "draws the scene once for each layer, front to back, and blends layers under each other",
             Self::Linear => "counts fragments, allocates exactly as much, captures and sorts pixel by pixel",
             Self::List => "links the fragments of each pixel, in one pass; repeats it if there was too little room",
+            Self::ABuffer => "captures into arrays, one for each pixel, all as long; repeats it if they were too short",
         }
     }
 }

@@ -88,8 +88,16 @@ impl Context {
                 push(&lost, GpuError::Lost(detail));
             }
         });
-        let name = if info.driver_info.is_empty() { info.name } else { format!("{} ({})", info.name, info.driver_info) };
+        let name =
+            if info.driver_info.is_empty() { info.name } else { format!("{} ({})", info.name, info.driver_info) };
         Ok(Self { device, queue, limits, features, name, is_software, faults })
+    }
+
+    /// A device that somebody else opened, and whose errors stay theirs.
+    pub(crate) fn adopt(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let (limits, features) = (device.limits(), device.features());
+        let faults = Arc::default();
+        Self { device, queue, limits, features, name: "your device".to_owned(), is_software: false, faults }
     }
 
     /// The device, in words.
@@ -133,8 +141,7 @@ impl Context {
             return Err(GpuError::Limit { what: label.into(), size: bytes, limit, limit_name });
         }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let descriptor =
-            wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
         let buffer = self.device.create_buffer(&descriptor);
         match pollster::block_on(scope.pop()) {
             None => Ok(buffer),

@@ -81,6 +81,10 @@ pub(crate) struct Frame<'a> {
     pub(crate) goal: Goal,
     /// Captures repeated because an estimate was too small.
     pub(crate) rerenders: u32,
+    /// Layers after which peeling stops.
+    pub(crate) max_layers: Option<u32>,
+    /// Pixels that had more.
+    pub(crate) cut_pixels: u64,
     frame_data: wgpu::Buffer,
     encoder: Option<wgpu::CommandEncoder>,
 }
@@ -113,6 +117,8 @@ impl<'a> Frame<'a> {
             picture,
             goal,
             rerenders: 0,
+            max_layers: None,
+            cut_pixels: 0,
             frame_data,
             encoder: None,
         }
@@ -152,13 +158,27 @@ impl<'a> Frame<'a> {
         color: Option<wgpu::RenderPassColorAttachment<'_>>,
         depth_ops: Option<wgpu::Operations<f32>>,
     ) -> Result<wgpu::RenderPass<'static>, GpuError> {
+        let depth = (&self.targets.opaque_depth_view, depth_ops);
+        match color {
+            Some(_) => self.render_pass_into(step, window, &[color], depth),
+            None => self.render_pass_into(step, window, &[], depth),
+        }
+    }
+
+    /// As [`Self::render_pass`], with a technique's own attachments, of the picture's size.
+    pub(crate) fn render_pass_into(
+        &mut self,
+        step: &'static str,
+        window: Window,
+        color_attachments: &[Option<wgpu::RenderPassColorAttachment<'_>>],
+        (view, depth_ops): (&TextureView, Option<wgpu::Operations<f32>>),
+    ) -> Result<wgpu::RenderPass<'static>, GpuError> {
         let stamps = self.begin_step(step)?;
-        let (targets, attachments) = (self.targets, [color]);
         let descriptor = wgpu::RenderPassDescriptor {
             label: Some(step),
-            color_attachments: if attachments[0].is_some() { &attachments } else { &[] },
+            color_attachments,
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.opaque_depth_view,
+                view,
                 depth_ops,
                 stencil_ops: None,
             }),

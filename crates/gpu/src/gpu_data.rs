@@ -136,9 +136,9 @@ impl DrawData {
             | bit(draw.mesh.colors().is_some(), flags::HAS_COLORS)
             | bit(draw.texture.is_some(), flags::HAS_TEXTURE);
         let normal = draw.view_from_normal;
-        let (transform, sampling) = draw.texture.map_or((glam::Affine2::IDENTITY, 0), |(texture, material)| {
-            (material.transform, sampling_bits(texture))
-        });
+        let (transform, sampling) = draw
+            .texture
+            .map_or((glam::Affine2::IDENTITY, 0), |(texture, material)| (material.transform, sampling_bits(texture)));
         let matrix = transform.matrix2;
         Self {
             clip_from_mesh: draw.clip_from_mesh,

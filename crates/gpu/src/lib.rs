@@ -7,6 +7,7 @@
 //! `readback`. `renderer` walks that flow from top to bottom; `frame` is everything that lives as long as one frame.
 //!
 //! What a device has to offer is WebGPU's defaults; see `context` for what is used beyond them where it is there.
+//! `lfb` is apart from that flow: the layered fragment buffer for renderers of other people, on the same shaders.
 //! Shaders are linked at build time from `shaders/`, by the same names as the modules here.
 #![forbid(unsafe_code)]
 
@@ -14,6 +15,7 @@ mod context;
 mod error;
 mod frame;
 pub mod gpu_data;
+pub mod lfb;
 pub mod memory;
 mod pass;
 mod readback;
@@ -28,4 +30,5 @@ pub use context::{AdapterSummary, Context, ContextOptions, adapter_summaries};
 pub use error::GpuError;
 pub use pass::picture::Totals;
 pub use pass::prefix_sum::PrefixSumData;
+pub use wgpu;
 pub use renderer::{DEFAULT_BUDGET_BYTES, GpuRenderer};

@@ -39,9 +39,8 @@ impl Window {
             ]);
         }
         let width = self.width / 2;
-        (width > 0).then(|| {
-            [Self { width, ..*self }, Self { left: self.left + width, width: self.width - width, ..*self }]
-        })
+        (width > 0)
+            .then(|| [Self { width, ..*self }, Self { left: self.left + width, width: self.width - width, ..*self }])
     }
 
     /// Parts, from the top, that each fit, as large as possible: bands of rows, and where one row does not fit, pieces of
@@ -50,13 +49,24 @@ impl Window {
     /// # Errors
     /// The number of fragments of the first pixel that does not fit alone.
     pub(crate) fn parts(&self, counts: &[u32], fits: impl Fn(u64, u64) -> bool) -> Result<Vec<Self>, u64> {
+        self.parts_by(counts, |a, b| a + b, fits)
+    }
+
+    /// As [`Self::parts`], where pixels together do not need the sum of what each needs but something else that grows
+    /// with both.
+    pub(crate) fn parts_by(
+        &self,
+        counts: &[u32],
+        join: fn(u64, u64) -> u64,
+        fits: impl Fn(u64, u64) -> bool,
+    ) -> Result<Vec<Self>, u64> {
         let width = self.width as usize;
         let row_totals: Vec<u64> =
-            counts.chunks(width).map(|row| row.iter().map(|&count| u64::from(count)).sum()).collect();
+            counts.chunks(width).map(|row| row.iter().map(|&count| u64::from(count)).fold(0, join)).collect();
         let mut parts = Vec::new();
         let mut row = 0;
         while row < row_totals.len() {
-            let rows = fitting(&row_totals[row..], width as u64, &fits);
+            let rows = fitting(&row_totals[row..], width as u64, join, &fits);
             let top = self.top + row as u32;
             if rows > 0 {
                 parts.push(Self { top, height: rows as u32, ..*self });
@@ -66,7 +76,7 @@ impl Window {
             let columns: Vec<u64> = counts[row * width..][..width].iter().map(|&count| u64::from(count)).collect();
             let mut column = 0;
             while column < width {
-                let pixels = fitting(&columns[column..], 1, &fits);
+                let pixels = fitting(&columns[column..], 1, join, &fits);
                 if pixels == 0 {
                     return Err(columns[column]);
                 }
@@ -80,14 +90,19 @@ impl Window {
 }
 
 /// How many of the first totals fit together.
-fn fitting(totals: &[u64], pixels_each: u64, fits: impl Fn(u64, u64) -> bool) -> usize {
-    let mut sum = 0u64;
+fn fitting(
+    totals: &[u64],
+    pixels_each: u64,
+    join: fn(u64, u64) -> u64,
+    fits: impl Fn(u64, u64) -> bool,
+) -> usize {
+    let mut joint = 0u64;
     totals
         .iter()
         .enumerate()
         .take_while(|&(i, &total)| {
-            sum += total;
-            fits((i as u64 + 1) * pixels_each, sum)
+            joint = join(joint, total);
+            fits((i as u64 + 1) * pixels_each, joint)
         })
         .count()
 }
@@ -124,12 +139,13 @@ impl Estimate {
 pub(crate) struct Memory {
     budget_bytes: u64,
     buffers: HashMap<&'static str, wgpu::Buffer>,
+    textures: HashMap<&'static str, wgpu::Texture>,
     peak_bytes: u64,
 }
 
 impl Memory {
     pub(crate) fn new(budget_bytes: u64) -> Self {
-        Self { budget_bytes, buffers: HashMap::new(), peak_bytes: 0 }
+        Self { budget_bytes, buffers: HashMap::new(), textures: HashMap::new(), peak_bytes: 0 }
     }
 
     /// Starts a frame: what is held is counted anew.
@@ -151,10 +167,38 @@ impl Memory {
         for buffer in self.buffers.drain().map(|(_, buffer)| buffer) {
             buffer.destroy();
         }
+        for texture in self.textures.drain().map(|(_, texture)| texture) {
+            texture.destroy();
+        }
     }
 
     fn held_bytes(&self) -> u64 {
-        self.buffers.values().map(wgpu::Buffer::size).sum()
+        self.held().map(|(_, bytes)| bytes).sum()
+    }
+
+    fn held(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        let buffers = self.buffers.iter().map(|(&name, buffer)| (name, buffer.size()));
+        buffers.chain(self.textures.iter().map(|(&name, texture)| (name, texture_bytes(texture))))
+    }
+
+    /// The texture of this name: the one there is if size and format are as described.
+    pub(crate) fn texture(
+        &mut self,
+        gpu: &Context,
+        name: &'static str,
+        descriptor: &wgpu::TextureDescriptor<'_>,
+    ) -> Result<wgpu::Texture, GpuError> {
+        if let Some(texture) = self.textures.get(name) {
+            if (texture.size(), texture.format()) == (descriptor.size, descriptor.format) {
+                return Ok(texture.clone());
+            }
+            texture.destroy();
+            self.textures.remove(name);
+        }
+        let texture = gpu.texture(&wgpu::TextureDescriptor { label: Some(name), ..descriptor.clone() })?;
+        self.textures.insert(name, texture.clone());
+        self.peak_bytes = self.peak_bytes.max(self.held_bytes());
+        Ok(texture)
     }
 
     /// The storage buffer of this name: the one there is if it is large enough, not twice too large, and leaves room for
@@ -208,22 +252,33 @@ impl Memory {
         }
     }
 
+    /// The storage buffer of this name, of any size: for passes that need something bound and do not touch it.
+    pub(crate) fn any_buffer(&mut self, gpu: &Context, name: &'static str) -> Result<wgpu::Buffer, GpuError> {
+        match self.buffers.get(name) {
+            Some(buffer) => Ok(buffer.clone()),
+            None => self.buffer(gpu, name, 16),
+        }
+    }
+
     /// Gives back buffers that are larger than these need to be, so that all of them fit the budget together. Techniques
     /// call it with everything a window needs, before they ask for any of it.
     pub(crate) fn make_room(&mut self, needs: &[(&'static str, u64)]) {
+        let need = |name| needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
+        let is_held = |name| self.held().any(|(held, _)| held == name);
         let total: u64 = self
-            .buffers
-            .iter()
-            .map(|(name, buffer)| {
-                let need = needs.iter().find(|(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
-                buffer.size().max(need)
-            })
-            .chain(needs.iter().filter(|(name, _)| !self.buffers.contains_key(name)).map(|&(_, bytes)| bytes))
+            .held()
+            .map(|(name, bytes)| bytes.max(need(name)))
+            .chain(needs.iter().filter(|&&(name, _)| !is_held(name)).map(|&(_, bytes)| bytes))
             .sum();
         if total > self.budget_bytes {
             self.clear();
         }
     }
+}
+
+fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+    let texel_bytes = texture.format().block_copy_size(None).unwrap_or(4);
+    u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel_bytes)
 }
 
 fn total(needs: &[(&'static str, u64)]) -> u64 {

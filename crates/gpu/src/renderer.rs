@@ -7,15 +7,14 @@ use std::time::Instant;
 use glam::Vec4;
 use pellucid_core::resolve::finish;
 use pellucid_core::{Image, Layers, Resolve, Scene, Stats, Technique, View};
-use wgpu::{BindGroupLayout, BufferUsages};
+use wgpu::BindGroupLayout;
 
 use crate::frame::{Frame, FrameParts, Goal, Targets};
-use crate::gpu_data::FrameData;
 use crate::memory::{Memory, Window};
 use crate::pass::opaque::OpaquePass;
 use crate::pass::picture::{self, PictureGroup, Totals};
 use crate::readback::{read_buffer, read_texture};
-use crate::surface::{SurfaceLayouts, Surfaces};
+use crate::surface::{DrawGroups, SurfaceLayouts, Surfaces};
 use crate::technique::{self, Capture, Layouts, Outcome};
 use crate::upload::SceneUpload;
 use crate::{Context, ContextOptions, GpuError};
@@ -30,6 +29,7 @@ pub struct GpuRenderer {
     surfaces: SurfaceLayouts,
     picture_layout: BindGroupLayout,
     budget_bytes: u64,
+    max_layers: Option<u32>,
     kept: Mutex<Kept>,
 }
 
@@ -43,6 +43,7 @@ struct Kept {
     memory: Memory,
     upload: Option<SceneUpload>,
     targets: Option<Targets>,
+    draw_groups: Option<DrawGroups>,
 }
 
 /// What came of a frame.
@@ -68,15 +69,24 @@ impl GpuRenderer {
             memory: Memory::new(DEFAULT_BUDGET_BYTES),
             upload: None,
             targets: None,
+            draw_groups: None,
         };
         gpu.check()?;
-        Ok(Self { gpu, surfaces, picture_layout, budget_bytes: DEFAULT_BUDGET_BYTES, kept: Mutex::new(kept) })
+        Ok(Self { gpu, surfaces, picture_layout, budget_bytes: DEFAULT_BUDGET_BYTES, max_layers: None, kept: Mutex::new(kept) })
     }
 
     /// The same renderer with another budget: the bytes a capture may hold. The picture is the same at any.
     #[must_use]
     pub fn budget_bytes(mut self, budget_bytes: u64) -> Self {
         self.budget_bytes = budget_bytes;
+        self
+    }
+
+    /// The same renderer, stopping after so many layers where the technique peels them off one by one; `None`: after the
+    /// last. [`Stats::cut_pixels`] tells where there were more. Other techniques capture all of them regardless.
+    #[must_use]
+    pub fn max_layers(mut self, max_layers: Option<u32>) -> Self {
+        self.max_layers = max_layers;
         self
     }
 
@@ -165,33 +175,23 @@ impl GpuRenderer {
             kept.targets = None;
             kept.targets = Some(Targets::new(gpu, view.width, view.height)?);
         }
-        let Kept { opaque, techniques, memory, upload: Some(upload), targets: Some(targets), .. } = kept else {
+        let Kept { opaque, techniques, memory, upload: Some(upload), targets: Some(targets), draw_groups, .. } = kept
+        else {
             unreachable!("both have just been made")
         };
         let capture = techniques.iter_mut().find(|(name, _)| *name == technique).map(|(_, capture)| capture);
         let Some(capture) = capture else { unreachable!("it has just been made") };
 
         let start = Instant::now();
-        let frame_data = gpu.buffer(
-            "the frame",
-            size_of::<FrameData>() as u64,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        )?;
-        let surfaces =
-            Surfaces::new(gpu, &self.surfaces, upload, (scene, view), &frame_data, &targets.opaque_depth_view)?;
+        let instances = scene.instances().len();
+        let groups = DrawGroups::ensure(draw_groups, gpu, &self.surfaces, instances, &targets.opaque_depth_view)?;
+        let surfaces = Surfaces::new(gpu, &self.surfaces, upload, (scene, view), groups)?;
+        let frame_data = groups.frame_data.clone();
         let picture = PictureGroup::new(gpu, &self.picture_layout, targets, &frame_data)?;
         let dropped_triangles = surfaces.dropped_triangles;
-        let mut frame = Frame::new(FrameParts {
-            gpu,
-            view,
-            resolve,
-            surfaces,
-            targets,
-            memory,
-            picture,
-            goal,
-            frame_data,
-        });
+        let mut frame =
+            Frame::new(FrameParts { gpu, view, resolve, surfaces, targets, memory, picture, goal, frame_data });
+        frame.max_layers = self.max_layers;
 
         let whole = Window { left: 0, top: 0, width: view.width, height: view.height };
         frame.set_window(whole)?;
@@ -228,6 +228,7 @@ impl GpuRenderer {
         stats.total_ms = total_ms;
         stats.windows = windows;
         stats.rerenders = frame.rerenders;
+        stats.cut_pixels = frame.cut_pixels;
         stats.peak_bytes = frame.memory.peak_bytes();
         let layers = match std::mem::replace(&mut frame.goal, Goal::Picture) {
             Goal::Picture => Vec::new(),

@@ -35,7 +35,7 @@ enum Cull {
 }
 
 /// One instance, ready to be recorded.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceDraw {
     pass: Pass,
     corners: u32,
@@ -52,10 +52,37 @@ pub(crate) struct Surfaces<'a> {
     draws: Vec<SurfaceDraw>,
     scene: &'a SceneUpload,
     layouts: &'a SurfaceLayouts,
-    /// One for each [`Pass`].
-    opaque_group: BindGroup,
-    transparent_group: BindGroup,
+    groups: &'a DrawGroups,
     pub(crate) dropped_triangles: u64,
+}
+
+/// Group 0 of surfaces, and the buffers in it. Kept from frame to frame, so that what was recorded with it can be
+/// replayed: a frame only writes into the buffers.
+#[derive(Debug)]
+pub(crate) struct DrawGroups {
+    pub(crate) frame_data: wgpu::Buffer,
+    instances: wgpu::Buffer,
+    opaque_depth: wgpu::TextureView,
+    /// One for each [`Pass`].
+    opaque: BindGroup,
+    transparent: BindGroup,
+}
+
+/// Everything that a recording of surfaces depends on: as long as it is equal, the recording can be replayed.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Structure {
+    scene: BindGroup,
+    groups: BindGroup,
+    draws: Vec<SurfaceDraw>,
+}
+
+/// What records one draw.
+struct DrawCommand<'a> {
+    pipeline: &'a wgpu::RenderPipeline,
+    frame_group: &'a BindGroup,
+    uniform_offset: u32,
+    texture: &'a BindGroup,
+    corners: u32,
 }
 
 /// What a pass does with surfaces.
@@ -189,10 +216,9 @@ impl<'a> Surfaces<'a> {
         layouts: &'a SurfaceLayouts,
         upload: &'a SceneUpload,
         (scene, view): (&Scene, &View),
-        frame_data: &wgpu::Buffer,
-        opaque_depth: &wgpu::TextureView,
+        groups: &'a DrawGroups,
     ) -> Result<Self, GpuError> {
-        let stride = size_of::<DrawData>().next_multiple_of(gpu.limits.min_uniform_buffer_offset_alignment as usize);
+        let stride = draw_stride(gpu);
         let core_draws = draws(scene, view)?;
         let mut bytes = vec![0; stride * core_draws.len().max(1)];
         let mut dropped_triangles = 0;
@@ -220,14 +246,117 @@ impl<'a> Surfaces<'a> {
                 }
             })
             .collect();
-        let uniforms = gpu.buffer(
-            "the instances",
-            bytes.len() as u64,
-            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        )?;
-        gpu.queue.write_buffer(&uniforms, 0, &bytes);
+        gpu.queue.write_buffer(&groups.instances, 0, &bytes);
+        Ok(Self { draws: surface_draws, scene: upload, layouts, groups, dropped_triangles })
+    }
+
+    /// How many draws a part of the frame takes.
+    pub(crate) fn count(&self, pass: Pass) -> usize {
+        self.draws.iter().filter(|draw| draw.pass == pass).count()
+    }
+
+    /// What a recording of transparent surfaces depends on.
+    pub(crate) fn structure(&self) -> Structure {
+        Structure {
+            scene: self.scene.bind_group.clone(),
+            groups: self.groups.transparent.clone(),
+            draws: self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).copied().collect(),
+        }
+    }
+
+    /// Records all draws of a part of the frame, in draw order. Group 3 must be set if the pipelines have one.
+    pub(crate) fn draw(
+        &self,
+        gpu: &Context,
+        recording: &mut wgpu::RenderPass<'_>,
+        pass: Pass,
+        pipelines: &mut SurfacePipelines,
+    ) {
+        recording.set_bind_group(1, &self.scene.bind_group, &[]);
+        self.for_each_draw(gpu, pass, pipelines, |draw| {
+            recording.set_pipeline(draw.pipeline);
+            recording.set_bind_group(0, draw.frame_group, &[draw.uniform_offset]);
+            recording.set_bind_group(2, draw.texture, &[]);
+            recording.draw(0..draw.corners, 0..1);
+        });
+    }
+
+    /// As [`Self::draw`], once for many passes: into a bundle.
+    pub(crate) fn record<'r>(
+        &'r self,
+        gpu: &Context,
+        recording: &mut wgpu::RenderBundleEncoder<'r>,
+        pass: Pass,
+        pipelines: &'r mut SurfacePipelines,
+    ) {
+        recording.set_bind_group(1, &self.scene.bind_group, &[]);
+        self.for_each_draw(gpu, pass, pipelines, |draw| {
+            recording.set_pipeline(draw.pipeline);
+            recording.set_bind_group(0, draw.frame_group, &[draw.uniform_offset]);
+            recording.set_bind_group(2, draw.texture, &[]);
+            recording.draw(0..draw.corners, 0..1);
+        });
+    }
+
+    fn for_each_draw<'r>(
+        &'r self,
+        gpu: &Context,
+        pass: Pass,
+        pipelines: &'r mut SurfacePipelines,
+        visit: impl FnMut(DrawCommand<'r>),
+    ) {
+        let draws = || self.draws.iter().filter(|draw| draw.pass == pass);
+        let ignores_color = pipelines.ignores_color;
+        let key = |draw: &SurfaceDraw| (draw.cull, if ignores_color { draw.has_cutoff } else { draw.varies });
+        draws().for_each(|draw| pipelines.make(gpu, self.layouts, key(draw)));
+        let pipelines = &pipelines.pipelines;
+        let commands = draws().map(|draw| DrawCommand {
+            pipeline: &pipelines[&key(draw)],
+            frame_group: match pass {
+                Pass::Opaque => &self.groups.opaque,
+                Pass::Transparent => &self.groups.transparent,
+            },
+            uniform_offset: draw.uniform_offset,
+            texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
+            corners: draw.corners,
+        });
+        commands.for_each(visit);
+    }
+}
+
+/// Bytes from the data of one draw to the next.
+fn draw_stride(gpu: &Context) -> usize {
+    size_of::<DrawData>().next_multiple_of(gpu.limits.min_uniform_buffer_offset_alignment as usize)
+}
+
+impl DrawGroups {
+    /// The groups for so many instances before this opaque depth: those there are if they fit, else new ones.
+    pub(crate) fn ensure<'k>(
+        kept: &'k mut Option<Self>,
+        gpu: &Context,
+        layouts: &SurfaceLayouts,
+        instances: usize,
+        opaque_depth: &wgpu::TextureView,
+    ) -> Result<&'k Self, GpuError> {
+        let bytes = (draw_stride(gpu) * instances.max(1)) as u64;
+        kept.take_if(|kept| kept.instances.size() != bytes || kept.opaque_depth != *opaque_depth);
+        Ok(match kept {
+            Some(kept) => kept,
+            none => none.insert(Self::new(gpu, layouts, bytes, opaque_depth)?),
+        })
+    }
+
+    fn new(
+        gpu: &Context,
+        layouts: &SurfaceLayouts,
+        bytes: u64,
+        opaque_depth: &wgpu::TextureView,
+    ) -> Result<Self, GpuError> {
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let frame_data = gpu.buffer("the frame", size_of::<FrameData>() as u64, usage)?;
+        let instances = gpu.buffer("the instances", bytes, usage)?;
         let draw_data = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-            buffer: &uniforms,
+            buffer: &instances,
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<DrawData>() as u64),
         });
@@ -242,38 +371,8 @@ impl<'a> Surfaces<'a> {
                 ],
             })
         };
-        debug_assert_eq!(frame_data.size(), size_of::<FrameData>() as u64);
-        Ok(Self {
-            draws: surface_draws,
-            scene: upload,
-            layouts,
-            opaque_group: group(&layouts.no_depth),
-            transparent_group: group(opaque_depth),
-            dropped_triangles,
-        })
-    }
-
-    /// Records all draws of a part of the frame, in draw order. Group 3 must be set if the pipelines have one.
-    pub(crate) fn draw(
-        &self,
-        gpu: &Context,
-        recording: &mut wgpu::RenderPass<'_>,
-        pass: Pass,
-        pipelines: &mut SurfacePipelines,
-    ) {
-        let frame_group = match pass {
-            Pass::Opaque => &self.opaque_group,
-            Pass::Transparent => &self.transparent_group,
-        };
-        recording.set_bind_group(1, &self.scene.bind_group, &[]);
-        for draw in self.draws.iter().filter(|draw| draw.pass == pass) {
-            let varied = if pipelines.ignores_color { draw.has_cutoff } else { draw.varies };
-            recording.set_pipeline(pipelines.get(gpu, self.layouts, draw.cull, varied));
-            recording.set_bind_group(0, frame_group, &[draw.uniform_offset]);
-            let texture = draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]);
-            recording.set_bind_group(2, texture, &[]);
-            recording.draw(0..draw.corners, 0..1);
-        }
+        let (opaque, transparent) = (group(&layouts.no_depth), group(opaque_depth));
+        Ok(Self { frame_data, instances, opaque_depth: opaque_depth.clone(), opaque, transparent })
     }
 }
 
@@ -300,12 +399,7 @@ impl SurfacePipelines {
     pub(crate) fn new(gpu: &Context, layouts: &SurfaceLayouts, pass: &SurfacePass<'_>) -> Self {
         let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(pass.label),
-            bind_group_layouts: &[
-                Some(&layouts.frame),
-                Some(&layouts.scene),
-                Some(&layouts.texture),
-                pass.own_layout,
-            ],
+            bind_group_layouts: &[Some(&layouts.frame), Some(&layouts.scene), Some(&layouts.texture), pass.own_layout],
             immediate_size: 0,
         });
         Self {
@@ -321,7 +415,7 @@ impl SurfacePipelines {
         }
     }
 
-    fn get(&mut self, gpu: &Context, layouts: &SurfaceLayouts, cull: Cull, varied: bool) -> &wgpu::RenderPipeline {
+    fn make(&mut self, gpu: &Context, layouts: &SurfaceLayouts, (cull, varied): (Cull, bool)) {
         self.pipelines.entry((cull, varied)).or_insert_with(|| {
             let (vertex_entry, fragment_entry) = match (varied, self.ignores_color) {
                 (true, _) => ("varied", self.varied),
@@ -356,7 +450,7 @@ impl SurfacePipelines {
                 multiview_mask: None,
                 cache: None,
             })
-        })
+        });
     }
 }
 

@@ -54,10 +54,8 @@ impl SceneUpload {
             storage(gpu, "the scene's attributes", bytemuck::cast_slice(&attributes))?,
             storage(gpu, "the scene's indices", bytemuck::cast_slice(&indices))?,
         ];
-        let entries = [0, 1, 2].map(|binding| wgpu::BindGroupEntry {
-            binding,
-            resource: buffers[binding as usize].as_entire_binding(),
-        });
+        let entries = [0, 1, 2]
+            .map(|binding| wgpu::BindGroupEntry { binding, resource: buffers[binding as usize].as_entire_binding() });
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
             layout: &layouts.scene,

@@ -25,6 +25,8 @@ pub use pellucid_core::{
     AlphaMode, Camera, Fragment, Frame, Image, Instance, Layers, Material, Mesh, Projection, Resolve, Scene, Shading,
     Stats, Technique, Texture, View,
 };
+#[cfg(feature = "gpu")]
+pub use pellucid_gpu as gpu;
 pub use pellucid_scene::builtin;
 pub use pellucid_scene::{LoadError, Loaded};
 pub use renderer::Renderer;

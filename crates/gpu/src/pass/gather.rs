@@ -101,7 +101,7 @@ impl Gather {
 }
 
 /// A stored fragment as the core has it. Twin: `unpack` in `shaders/shared/fragment.wesl`.
-fn unpack([rg, ba, depth, primitive]: [u32; 4]) -> Fragment {
+pub(crate) fn unpack([rg, ba, depth, primitive]: [u32; 4]) -> Fragment {
     let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
     Fragment {
         color: Vec4::new(half(rg), half(rg >> 16), half(ba), half(ba >> 16)),
@@ -110,7 +110,7 @@ fn unpack([rg, ba, depth, primitive]: [u32; 4]) -> Fragment {
     }
 }
 
-fn opaque_surfaces(frame: &mut Frame<'_>, window: Window) -> Result<Vec<Option<OpaqueSurface>>, GpuError> {
+pub(crate) fn opaque_surfaces(frame: &mut Frame<'_>, window: Window) -> Result<Vec<Option<OpaqueSurface>>, GpuError> {
     let targets = frame.targets;
     let colors: Vec<[f16; 4]> = read_texture(frame, &targets.opaque_color, wgpu::TextureAspect::All)?;
     let depths: Vec<f32> = read_texture(frame, &targets.opaque_depth, wgpu::TextureAspect::DepthOnly)?;

@@ -98,12 +98,7 @@ pub(crate) fn resolve_code(resolve: Resolve) -> u32 {
 }
 
 /// Dispatches over the pixels of a window with the picture as group 0 and the LFB as group 3.
-pub(crate) fn dispatch_window(
-    pass: &mut wgpu::ComputePass<'_>,
-    frame: &Frame<'_>,
-    window: Window,
-    lfb: &BindGroup,
-) {
+pub(crate) fn dispatch_window(pass: &mut wgpu::ComputePass<'_>, frame: &Frame<'_>, window: Window, lfb: &BindGroup) {
     pass.set_bind_group(0, &frame.picture.bind_group, &[]);
     pass.set_bind_group(3, lfb, &[]);
     pass.dispatch_workgroups(window.width.div_ceil(GROUP_PX), window.height.div_ceil(GROUP_PX), 1);

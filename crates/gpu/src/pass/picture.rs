@@ -40,7 +40,8 @@ pub(crate) struct PictureGroup {
 }
 
 pub(crate) fn layout(gpu: &Context) -> BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: ShaderStages::COMPUTE, ty, count: None };
+    let entry =
+        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: ShaderStages::COMPUTE, ty, count: None };
     let texture = |sample_type| BindingType::Texture {
         sample_type,
         view_dimension: wgpu::TextureViewDimension::D2,

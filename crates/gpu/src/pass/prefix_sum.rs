@@ -24,6 +24,9 @@ pub struct PrefixSumData {
 /// Names of the buffers that hold block sums, level by level; 2048^3 values are more than a binding holds.
 const LEVELS: [&str; 3] = ["sums of blocks", "sums of sums of blocks", "sum of all blocks"];
 
+/// One level, and its number of blocks.
+pub(crate) type PrefixSumGroup = (wgpu::BindGroup, u64);
+
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct PrefixSum {
@@ -86,21 +89,32 @@ impl PrefixSum {
         for (name, bytes) in Self::needs(length) {
             buffers.push(frame.memory.buffer(gpu, name, bytes)?);
         }
-        let groups = lengths(length)
-            .windows(2)
-            .zip(buffers.windows(2))
-            .map(|(lengths, buffers)| Ok((self.bind_group(gpu, lengths[0], buffers)?, lengths[1])))
-            .collect::<Result<Vec<_>, GpuError>>()?;
-        let mut pass = frame.compute_pass(step)?;
+        let groups = self.groups(gpu, length, &buffers)?;
+        self.run(&mut frame.compute_pass(step)?, &groups);
+        Ok(())
+    }
+
+    /// What it runs on: the values, then the buffers that it [`needs`](Self::needs).
+    pub(crate) fn groups(
+        &self,
+        gpu: &Context,
+        length: u64,
+        buffers: &[wgpu::Buffer],
+    ) -> Result<Vec<PrefixSumGroup>, GpuError> {
+        let levels = lengths(length);
+        let pairs = levels.windows(2).zip(buffers.windows(2));
+        pairs.map(|(lengths, buffers)| Ok((self.bind_group(gpu, lengths[0], buffers)?, lengths[1]))).collect()
+    }
+
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, groups: &[PrefixSumGroup]) {
         pass.set_pipeline(&self.sum_blocks);
-        for (group, blocks) in &groups {
-            dispatch(&mut pass, group, *blocks);
+        for (group, blocks) in groups {
+            dispatch(pass, group, *blocks);
         }
         pass.set_pipeline(&self.add_block_sums);
         for (group, blocks) in groups.iter().rev().skip(1) {
-            dispatch(&mut pass, group, *blocks);
+            dispatch(pass, group, *blocks);
         }
-        Ok(())
     }
 
     fn bind_group(&self, gpu: &Context, length: u64, buffers: &[wgpu::Buffer]) -> Result<wgpu::BindGroup, GpuError> {

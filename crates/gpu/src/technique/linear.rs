@@ -51,11 +51,8 @@ impl Linear {
             own_layout: Some(&layout),
         };
         let pipelines = |pass| SurfacePipelines::new(gpu, layouts.surfaces, &pass);
-        let ordered_shaders = LfbShaders {
-            sort: shaders::SORT_LINEAR,
-            resolve: shaders::RESOLVE_LINEAR,
-            gather: shaders::GATHER_LINEAR,
-        };
+        let ordered_shaders =
+            LfbShaders { sort: shaders::SORT_LINEAR, resolve: shaders::RESOLVE_LINEAR, gather: shaders::GATHER_LINEAR };
         Self {
             count: pipelines(pass("count render", "count", "count_varied", true)),
             capture: pipelines(pass("main render", "capture", "capture_varied", false)),
@@ -96,8 +93,8 @@ impl Capture for Linear {
         frame.memory.make_room(&Self::needs(pixels, 0));
         let offsets = frame.memory.buffer(gpu, OFFSETS, entries * 4)?;
         frame.zero("zero", &offsets, entries * 4)?;
-        // Counting does not touch the fragments: any will do in their place.
-        let fragments = frame.memory.buffer(gpu, FRAGMENTS, FRAGMENT_BYTES)?;
+        // Counting does not touch the fragments.
+        let fragments = frame.memory.any_buffer(gpu, FRAGMENTS)?;
         let group = self.bind_group(gpu, &offsets, &fragments);
         let mut pass = frame.capture_pass("count render", window)?;
         pass.set_bind_group(3, &group, &[]);

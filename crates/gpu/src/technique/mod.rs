@@ -3,10 +3,12 @@
 //! A technique is the long-lived half: pipelines, and estimates that are good for the next frame. Buffers it asks of
 //! [`Frame::memory`], which keeps them by name and counts their bytes. The per-frame half is [`Frame`].
 
+mod abuffer;
 mod alpha;
 mod growth;
 mod linear;
 mod list;
+mod peel;
 
 use pellucid_core::Technique;
 use wgpu::BindGroupLayout;
@@ -45,7 +47,9 @@ pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, technique: Technique) -> 
     match technique {
         Technique::Alpha => Ok(Box::new(alpha::Alpha::new(gpu, layouts))),
         Technique::Linear => Ok(Box::new(linear::Linear::new(gpu, layouts))),
+        Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts))),
         Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
+        Technique::Peel => Ok(Box::new(peel::Peel::new(gpu, layouts))),
         Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
     }
 }

@@ -227,7 +227,8 @@ impl Entry {
             peak_bytes: stats.map(|stats| stats.peak_bytes),
             windows: stats.map(|stats| stats.windows),
             rerenders: stats.map(|stats| stats.rerenders),
-            fragments: stats.map(|stats| stats.fragments),
+            // What captures none has none to count.
+            fragments: stats.filter(|stats| stats.technique.is_exact()).map(|stats| stats.fragments),
             max_error: measured.max_error(),
             differing: measured.differing(),
             psnr: Some(measured.psnr).filter(|psnr| psnr.is_finite()),

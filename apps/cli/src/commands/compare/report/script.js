@@ -7,7 +7,7 @@ const $ = (id) => document.getElementById(id);
 const source = (name) => (pictures[name].startsWith("data:") ? pictures[name] : source(pictures[name]));
 const count = (n) => n.toLocaleString("en");
 const plural = (n, noun) => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
-const percent = (part) => `${(100 * part).toFixed(part > 0 && part < 0.1 ? 1 : 0)} %`;
+const percent = (part) => (part > 0 && part < 0.0005 ? "< 0.1 %" : `${(100 * part).toFixed(part > 0 && part < 0.1 ? 1 : 0)} %`);
 const element = (tag, properties = {}, ...children) => {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);
@@ -47,7 +47,7 @@ const entries = report.techniques;
 const reference = `reference (${report.reference.technique})`;
 $("facts").textContent = [
   `${report.width} × ${report.height} pixels`, plural(report.triangles, "triangle"), plural(report.fragments, "fragment"),
-  `at most ${plural(report.max_depth_complexity, "layer")} behind a pixel`, `held against the ${report.reference.technique === "cpu" ? "CPU renderer" : "oracle"}`,
+  ...(report.fragments ? [`at most ${plural(report.max_depth_complexity, "layer")} behind a pixel`] : []), `held against the ${report.reference.technique === "cpu" ? "CPU renderer" : "oracle"}`,
 ].join(" · ");
 for (const entry of entries) {
   let [kind, verdict] = ["", `differs at ${plural(entry.differing, "pixel")}`];
@@ -86,6 +86,9 @@ $("swap").addEventListener("click", () => {
   showSides();
 });
 const viewer = $("viewer");
+// All of it fits the window, and small pictures show their pixels.
+viewer.style.maxWidth = `calc(88vh * ${report.width / report.height})`;
+document.body.classList.toggle("small", report.width < 500);
 $("slider").addEventListener("input", (event) => viewer.style.setProperty("--split", `${event.target.value}%`));
 new ResizeObserver(() => viewer.classList.toggle("enlarged", viewer.clientWidth * devicePixelRatio > report.width)).observe(viewer);
 const pixelAt = (event) => {
@@ -122,7 +125,7 @@ const heading = element("tr", {}, ...["technique", ...columns.map(([name]) => na
 const rows = entries.map((entry) => {
   const cells = columns.map(([name, of]) => {
     const text = of(entry);
-    const judged = name === "unexplained" && text !== false ? (entry.unexplained ? "bad" : "good") : "";
+    const judged = name === "unexplained" && text !== false && entry.exact ? (entry.unexplained ? "bad" : "good") : "";
     return element("td", { textContent: text || "–", className: text === false ? "none" : judged });
   });
   return element("tr", { title: entry.device ?? "blended in draw order from the reference's layers" }, element("th", { scope: "row", textContent: entry.name }), ...cells);
@@ -131,7 +134,8 @@ $("table").append(element("thead", {}, heading), element("tbody", {}, ...rows));
 
 /* A closer look */
 
-const REACH = 8;
+/** Pixels shown beside, and above, the one looked at. */
+const REACH = [10, 7];
 const titles = { worst: (spot) => `worst of ${spot.technique}`, deepest: () => "deepest pixel", chosen: (spot) => `pixel ${spot.x}, ${spot.y}` };
 for (const spot of report.spots) {
   const button = element("button", { type: "button", textContent: titles[spot.kind](spot) });
@@ -140,17 +144,17 @@ for (const spot of report.spots) {
   $("spots").append(button);
 }
 async function pane(label, name, { x, y }) {
-  const size = 2 * REACH + 1;
-  const zoom = 20;
-  const canvas = element("canvas", { width: size * zoom, height: size * zoom, role: "img", ariaLabel: `${label}, around pixel ${x}, ${y}` });
+  const [wide, high] = REACH.map((reach) => 2 * reach + 1);
+  const zoom = 24;
+  const canvas = element("canvas", { width: wide * zoom, height: high * zoom, role: "img", ariaLabel: `${label}, around pixel ${x}, ${y}` });
   const { canvas: picture, color } = await pixelsOf(name);
   const context = canvas.getContext("2d");
   context.imageSmoothingEnabled = false;
-  context.drawImage(picture, x - REACH, y - REACH, size, size, 0, 0, canvas.width, canvas.height);
-  for (const [width, style] of [[4, "#000"], [2, "#fff"]]) {
-    context.lineWidth = width;
+  context.drawImage(picture, x - REACH[0], y - REACH[1], wide, high, 0, 0, canvas.width, canvas.height);
+  for (const [outset, style] of [[3, "#000"], [1.5, "#fff"]]) {
+    context.lineWidth = 1.5;
     context.strokeStyle = style;
-    context.strokeRect(REACH * zoom, REACH * zoom, zoom, zoom);
+    context.strokeRect(REACH[0] * zoom - outset, REACH[1] * zoom - outset, zoom + 2 * outset, zoom + 2 * outset);
   }
   return element("figure", {}, canvas, element("figcaption", {}, label, element("code", { textContent: color(x, y) })));
 }
@@ -233,6 +237,7 @@ $("histogram-caption").append(
   element("span", { textContent: `${percent(1 - report.depth_complexity[0] / all)} of the pixels have layers, ${report.mean_depth_complexity.toFixed(1)} on average` }),
   element("span", { textContent: plural(greatest, "layer") }),
 );
+if (greatest === 0) $("complexity").closest("section").hidden = true;
 
 /* Layers */
 

@@ -1,0 +1,119 @@
+//! Every exact technique of the GPU against the oracle, in every case of the suite; its bits at any budget and every time.
+
+use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer};
+use pellucid::{Error, Renderer, Resolve, Technique, View};
+use pellucid_conformance::suite::{CASES, Candidate, Check};
+
+/// Exact techniques that run on the GPU.
+fn techniques() -> impl Iterator<Item = Technique> {
+    Technique::ALL.into_iter().filter(|technique| technique.backend() == "gpu" && technique.is_exact())
+}
+
+/// The best device there is; `None`, with a notice, if there is none, unless `PELLUCID_REQUIRE_GPU` is 1.
+fn gpu(floor: bool) -> Option<GpuRenderer> {
+    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
+        Ok(gpu) => Some(gpu),
+        Err(error @ GpuError::NoAdapter) => {
+            let required = std::env::var("PELLUCID_REQUIRE_GPU").is_ok_and(|value| value == "1");
+            assert!(!required, "PELLUCID_REQUIRE_GPU is 1, but: {error}");
+            eprintln!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// With every useful feature, and on the portability floor. All failures are listed, not the first alone: what fails
+/// together tells why.
+#[test]
+fn exact_techniques_agree_with_the_oracle() {
+    let mut candidates = Vec::new();
+    for floor in [false, true] {
+        for technique in techniques() {
+            let Some(gpu) = gpu(floor) else { return };
+            let what = format!("{technique}{}", if floor { " on the floor" } else { "" });
+            candidates.push((what, Candidate::new(technique, Renderer::new().gpu(gpu))));
+        }
+    }
+    let mut failures = Vec::new();
+    for case in CASES {
+        let start = std::time::Instant::now();
+        let prepared = case.prepare().unwrap();
+        let prep = start.elapsed();
+        for (what, candidate) in &candidates {
+            for check in Check::ALL {
+                let comparison = prepared.run(check, candidate).unwrap_or_else(|error| panic!("{case:?}: {error}"));
+                if !comparison.passes() {
+                    failures.push(format!("{what}, {case:?}, {check}: {comparison:?}"));
+                    println!("{what}, {case:?}, {check}: {comparison:?}");
+                }
+            }
+        }
+        println!("{case:?} {prep:?} of {:?}", start.elapsed());
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn bits_depend_on_neither_budget_nor_repetition() {
+    let cases = ["@planes:n=40", "@hairball:strands=60", "@gallery"];
+    for technique in techniques() {
+        let Some(device) = gpu(false) else { return };
+        let mut renderer = Renderer::new().gpu(device).technique(technique);
+        for source in cases {
+            let scene = pellucid::load(source).unwrap().scene;
+            let view = View::of(&scene).size(97, 65).opacity(0.8);
+            let whole = renderer.render(&scene, &view, Resolve::Blend).unwrap();
+            assert_eq!(whole.stats.windows, 1);
+            for _ in 0..4 {
+                let again = renderer.render(&scene, &view, Resolve::Blend).unwrap();
+                assert!(again.image == whole.image, "{technique}, {source}: another picture the second time");
+            }
+            for parts in [2, 4, 16, 64] {
+                let budget_bytes = whole.stats.peak_bytes / parts;
+                let limited = Renderer::new().gpu(gpu(false).unwrap().budget_bytes(budget_bytes)).technique(technique);
+                let frame = limited.render(&scene, &view, Resolve::Blend).unwrap();
+                assert!(frame.image == whole.image, "{technique}, {source}: another picture at 1/{parts}");
+                assert!(frame.stats.peak_bytes <= budget_bytes, "{technique}, {source}: {:?}", frame.stats);
+                assert!(u64::from(frame.stats.windows) >= parts, "{technique}, {source}: {:?}", frame.stats);
+                assert_eq!(frame.stats.fragments, whole.stats.fragments);
+            }
+            renderer = renderer.technique(technique);
+        }
+    }
+}
+
+#[test]
+fn a_budget_too_small_for_one_pixel_is_refused_with_what_it_takes() {
+    let Some(gpu) = gpu(false) else { return };
+    let scene = pellucid::load("@planes:n=1000").unwrap().scene;
+    let view = View::of(&scene).size(8, 8);
+    let renderer = Renderer::new().gpu(gpu.budget_bytes(4000)).technique(Technique::Linear);
+    let error = renderer.render(&scene, &view, Resolve::Blend).unwrap_err();
+    assert!(matches!(error, Error::Gpu(GpuError::Budget { needed, budget: 4000 }) if needed > 16_000), "{error}");
+}
+
+#[test]
+fn a_change_of_size_scene_or_technique_leaves_no_trace() {
+    let Some(device) = gpu(false) else { return };
+    let mut renderer = Renderer::new().gpu(device);
+    let scenes = ["@boxes:n=3", "@spheres:n=20", "@gallery"].map(|source| pellucid::load(source).unwrap().scene);
+    let mut first = Vec::new();
+    for round in 0..2 {
+        let mut pictures = Vec::new();
+        for technique in [Technique::Linear, Technique::Alpha] {
+            renderer = renderer.technique(technique);
+            for scene in &scenes {
+                for size in [(40, 30), (129, 17)] {
+                    let view = View::of(scene).size(size.0, size.1);
+                    pictures.push(renderer.render(scene, &view, Resolve::Blend).unwrap().image);
+                }
+            }
+        }
+        if round == 0 {
+            first = pictures;
+        } else {
+            assert!(first == pictures);
+        }
+    }
+}
