@@ -132,7 +132,8 @@ impl Capture for ABuffer {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let known = self.known.take(window);
         let wanted = known.unwrap_or(self.guess);
-        let Some(mut room) = most_that_fits(wanted, |layers| frame.memory.fits(gpu, &Self::needs(pixels, layers))) else {
+        let Some(mut room) = most_that_fits(wanted, |layers| frame.memory.fits(gpu, &Self::needs(pixels, layers)))
+        else {
             return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
         };
         loop {
