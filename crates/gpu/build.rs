@@ -26,7 +26,9 @@ impl LfbResolver {
         match &self.lfb {
             Some(lfb) if path.components == ["lfb"] => lfb,
             Some(lfb) if lfb.components[0] == "lfb" => match path.components.as_slice() {
-                [folder, stem] if folder == "shared" && ["frame", "picture", "fragment"].contains(&stem.as_str()) => lfb,
+                [folder, stem] if folder == "shared" && ["frame", "picture", "fragment"].contains(&stem.as_str()) => {
+                    lfb
+                }
                 _ => path,
             },
             _ => path,
@@ -119,8 +121,7 @@ fn link(folder: &str, stem: &str, technique: Option<(&String, bool)>) -> String 
 /// Links with the LFB that has payloads of so many words.
 fn link_interface(folder: &str, stem: &str, words: u32, read_only: bool) -> String {
     let payload = |n| (["payload_1", "payload_2", "payload_3", "payload_4"][n as usize - 1], n == words);
-    let features =
-        [("random_access", true), ("read_only", read_only), payload(1), payload(2), payload(3), payload(4)];
+    let features = [("random_access", true), ("read_only", read_only), payload(1), payload(2), payload(3), payload(4)];
     compile(&path(folder, stem), Some(path("lfb", "stored")), &features)
 }
 

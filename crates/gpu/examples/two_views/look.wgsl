@@ -33,6 +33,7 @@ fn look(@builtin(global_invocation_id) at: vec3<u32>) {
 fn blended(pixel: vec2<u32>) -> vec3<f32> {
     let size = vec2<f32>(camera_size());
     let across = (vec2<f32>(pixel) + 0.5) / size * vec2(2.0, -2.0) + vec2(-1.0, 1.0);
+    let sky = mix(vec3(0.55, 0.62, 0.7), vec3(0.16, 0.26, 0.42), clamp(1.4 * across.y - 0.4, 0.0, 1.0));
     let layers = camera_range(pixel);
     var color = vec3(0.0);
     var through = 1.0;
@@ -41,14 +42,16 @@ fn blended(pixel: vec2<u32>) -> vec3<f32> {
         let surface = unpack4x8unorm(layer.payload.x);
         let scattered = unpack2x16float(layer.payload.y);
         let world = from_camera.world_from_clip * vec4(across, layer.depth, 1.0);
-        let sun = SUN * sunlight(world.xyz / world.w);
-        color += through * (surface.rgb * surface.a * (AMBIENT + 0.8 * scattered.x * sun) + scattered.y * sun);
+        let place = world.xyz / world.w;
+        let sun = SUN * sunlight(place);
+        let lit = surface.rgb * (AMBIENT + 0.8 * scattered.x * sun);
+        let haze = smoothstep(4.0, 24.0, length(place));
+        color += through * (mix(lit, sky, haze) * surface.a + scattered.y * sun);
         through *= 1.0 - surface.a;
         if through < 0.002 {
             break;
         }
     }
-    let sky = mix(vec3(0.62, 0.7, 0.8), vec3(0.3, 0.42, 0.6), clamp(across.y, 0.0, 1.0));
     return color + through * sky;
 }
 
@@ -77,6 +80,7 @@ fn let_through(pixel: vec2<i32>, depth: f32) -> vec3<f32> {
     // None lie outside, and what is negative is far outside.
     let layers = light_range(vec2<u32>(pixel));
     var through = vec3(1.0);
+    // No break at the first layer behind: lavapipe (Mesa 22.3) crashes on it in loops as deep as these.
     for (var i = layers.first; i < layers.end; i++) {
         let layer = light_at(i);
         through *= select(vec3(1.0), unpack4x8unorm(layer.payload).rgb, layer.depth < depth - BIAS);

@@ -25,7 +25,7 @@ struct Thing {
 
 const QUADS: u32 = 3u;
 const things = array(
-    Thing(vec3(0.0, 0.0, 0.0), 30.0, vec3(0.82, 0.81, 0.79), 1.0),
+    Thing(vec3(0.0, 0.0, 0.0), 30.0, vec3(0.66, 0.65, 0.63), 1.0),
     Thing(vec3(-2.55, 1.15, -1.3), 1.15, vec3(1.0, 0.62, 0.08), 0.45),
     Thing(vec3(2.75, 0.95, -1.55), 0.95, vec3(0.25, 0.8, 0.35), 0.45),
     Thing(vec3(0.0, 1.25, -0.45), 1.25, vec3(0.12, 0.42, 0.95), 0.3),
@@ -48,7 +48,7 @@ fn vertex(@builtin(vertex_index) v: u32, @builtin(instance_index) number: u32) -
     var all_things = things;
     let thing = all_things[number];
     // The two triangles of a square.
-    let corner = vec2((0x2cu >> (v % 6u)) & 1u, (0x34u >> (v % 6u)) & 1u);
+    let corner = vec2((0x32u >> (v % 6u)) & 1u, (0x2cu >> (v % 6u)) & 1u);
     var world = thing.center;
     var normal = vec3(0.0, 1.0, 0.0);
     if number == 0u {
