@@ -52,7 +52,7 @@ fn techniques_are_listed_with_exactness_and_memory() {
     let work = Workplace::new();
     let text = work.succeed("techniques").stdout;
     let line = text.lines().find(|line| line.starts_with("oracle")).unwrap();
-    assert!(line.contains("yes") && line.contains("24 B x fragments"), "{line}");
+    assert!(line.contains("yes") && line.contains("32 B x fragments"), "{line}");
     let list: Value = serde_json::from_str(&work.succeed("techniques --json").stdout).unwrap();
     assert_eq!(list["techniques"][0]["name"], "cpu");
 }

@@ -22,11 +22,14 @@ pub enum Technique {
     List,
     /// As much room for every pixel as the deepest needs (Crassin 2010).
     ABuffer,
+    /// Linked pages of fragments for each pixel (Crassin 2010, follow-up; LFB chapter, section 20.2).
+    Pages,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 7] = [Self::Cpu, Self::Oracle, Self::Alpha, Self::Peel, Self::Linear, Self::List, Self::ABuffer];
+    pub const ALL: [Self; 8] =
+        [Self::Cpu, Self::Oracle, Self::Alpha, Self::Peel, Self::Linear, Self::List, Self::ABuffer, Self::Pages];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -38,6 +41,7 @@ impl Technique {
             Self::Linear => "linear",
             Self::List => "list",
             Self::ABuffer => "abuffer",
+            Self::Pages => "pages",
         }
     }
 
@@ -45,14 +49,14 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
-            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer => "gpu",
+            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages => "gpu",
         }
     }
 
     /// Whether it captures every fragment and orders all of them.
     pub fn is_exact(self) -> bool {
         match self {
-            Self::Cpu | Self::Oracle | Self::Peel | Self::Linear | Self::List | Self::ABuffer => true,
+            Self::Cpu | Self::Oracle | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages => true,
             Self::Alpha => false,
         }
     }
@@ -60,7 +64,7 @@ impl Technique {
     /// Passes over the geometry.
     pub fn passes(self) -> &'static str {
         match self {
-            Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer => "1",
+            Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer | Self::Pages => "1",
             Self::Peel => "layers + 1",
             Self::Linear => "2",
         }
@@ -76,6 +80,7 @@ impl Technique {
             Self::Linear => "4 B x pixels + 16 B x fragments",
             Self::List => "8 B x pixels + 20 B x fragments",
             Self::ABuffer => "4 B x pixels + 16 B x pixels x greatest depth complexity",
+            Self::Pages => "8 B x pixels + 68 B x pages of 4 fragments",
         }
     }
 
@@ -89,6 +94,9 @@ impl Technique {
             Self::Linear => "counts fragments, allocates exactly as much, captures and sorts pixel by pixel",
             Self::List => "links the fragments of each pixel, in one pass; repeats it if there was too little room",
             Self::ABuffer => "captures into arrays, one for each pixel, all as long; repeats it if they were too short",
+            Self::Pages => {
+                "links pages of fragments of each pixel, in one pass; repeats it if there was too little room"
+            }
         }
     }
 }

@@ -30,5 +30,5 @@ pub use context::{AdapterSummary, Context, ContextOptions, adapter_summaries};
 pub use error::GpuError;
 pub use pass::picture::Totals;
 pub use pass::prefix_sum::PrefixSumData;
-pub use wgpu;
 pub use renderer::{DEFAULT_BUDGET_BYTES, GpuRenderer};
+pub use wgpu;

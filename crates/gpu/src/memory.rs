@@ -90,12 +90,7 @@ impl Window {
 }
 
 /// How many of the first totals fit together.
-fn fitting(
-    totals: &[u64],
-    pixels_each: u64,
-    join: fn(u64, u64) -> u64,
-    fits: impl Fn(u64, u64) -> bool,
-) -> usize {
+fn fitting(totals: &[u64], pixels_each: u64, join: fn(u64, u64) -> u64, fits: impl Fn(u64, u64) -> bool) -> usize {
     let mut joint = 0u64;
     totals
         .iter()

@@ -72,7 +72,14 @@ impl GpuRenderer {
             draw_groups: None,
         };
         gpu.check()?;
-        Ok(Self { gpu, surfaces, picture_layout, budget_bytes: DEFAULT_BUDGET_BYTES, max_layers: None, kept: Mutex::new(kept) })
+        Ok(Self {
+            gpu,
+            surfaces,
+            picture_layout,
+            budget_bytes: DEFAULT_BUDGET_BYTES,
+            max_layers: None,
+            kept: Mutex::new(kept),
+        })
     }
 
     /// The same renderer with another budget: the bytes a capture may hold. The picture is the same at any.

@@ -8,12 +8,14 @@ mod two_views;
 
 /// Devices of somebody else: on WebGPU's default limits, and on all the adapter has. Their errors panic.
 fn devices() -> Vec<(wgpu::Device, wgpu::Queue)> {
+    // Software devices may take gigabytes for the deepest scenes: asked for, not by the way.
+    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
+        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
+        return Vec::new();
+    }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let Ok(adapter) = pollster::block_on(instance.request_adapter(&Default::default())) else {
-        let required = std::env::var("PELLUCID_REQUIRE_GPU").is_ok_and(|value| value == "1");
-        assert!(!required, "PELLUCID_REQUIRE_GPU is 1, but there is no adapter");
-        eprintln!("skipped: no adapter");
-        return Vec::new();
+        panic!("PELLUCID_REQUIRE_GPU is 1, but there is no adapter");
     };
     [
         (wgpu::Limits::defaults(), wgpu::Features::empty()),

@@ -6,7 +6,7 @@ mod common;
 use pellucid_core::{Resolve, Scene, Technique, View, oracle};
 use pellucid_gpu::GpuRenderer;
 
-const TECHNIQUES: [Technique; 2] = [Technique::List, Technique::ABuffer];
+const TECHNIQUES: [Technique; 3] = [Technique::List, Technique::ABuffer, Technique::Pages];
 
 fn load(source: &str) -> Scene {
     pellucid_scene::load(source).unwrap().scene
@@ -96,6 +96,10 @@ fn a_repaired_capture_holds_what_its_formula_says() {
         let bytes = match technique {
             Technique::List => 8 * pixels + 4 + 20 * stats.fragments,
             Technique::ABuffer => 4 * pixels + 4 + 16 * pixels * u64::from(stats.max_depth_complexity),
+            Technique::Pages => {
+                let pages = pixels * u64::from(stats.max_depth_complexity.div_ceil(4));
+                8 * pixels + 4 + 68 * (pages + pages / 32)
+            }
             _ => unreachable!(),
         };
         assert_eq!(stats.peak_bytes, bytes, "{technique}: {}", technique.memory_formula());

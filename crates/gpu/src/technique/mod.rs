@@ -8,6 +8,7 @@ mod alpha;
 mod growth;
 mod linear;
 mod list;
+mod pages;
 mod peel;
 
 use pellucid_core::Technique;
@@ -47,6 +48,7 @@ pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, technique: Technique) -> 
     match technique {
         Technique::Alpha => Ok(Box::new(alpha::Alpha::new(gpu, layouts))),
         Technique::Linear => Ok(Box::new(linear::Linear::new(gpu, layouts))),
+        Technique::Pages => Ok(Box::new(pages::Pages::new(gpu, layouts))),
         Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts))),
         Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
         Technique::Peel => Ok(Box::new(peel::Peel::new(gpu, layouts))),

@@ -18,7 +18,7 @@ enum Source {
     /// The oracle's memory.
     Oracle(Capture),
     /// Another run of the CPU renderer, which needs no memory for all of them at once.
-    Cpu(Renderer),
+    Cpu(Box<Renderer>),
 }
 
 /// The oracle where it takes seconds, else the CPU renderer.
@@ -37,7 +37,7 @@ impl Reference {
         }
         let cpu = cpu.technique(Technique::Cpu);
         let frame = cpu.render(scene, view, Resolve::Blend)?;
-        Ok(Self { image: frame.image, stats: frame.stats, source: Source::Cpu(cpu) })
+        Ok(Self { image: frame.image, stats: frame.stats, source: Source::Cpu(Box::new(cpu)) })
     }
 
     pub(super) fn image(&self) -> &Image {

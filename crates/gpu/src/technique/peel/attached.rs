@@ -88,10 +88,7 @@ impl Attachments {
                 texture(PRIMITIVES[0], PRIMITIVE_FORMAT, usage)?,
                 texture(PRIMITIVES[1], PRIMITIVE_FORMAT, usage)?,
             ],
-            depths: [
-                texture(DEPTHS[0], DEPTH_FORMAT, depth_usage)?,
-                texture(DEPTHS[1], DEPTH_FORMAT, depth_usage)?,
-            ],
+            depths: [texture(DEPTHS[0], DEPTH_FORMAT, depth_usage)?, texture(DEPTHS[1], DEPTH_FORMAT, depth_usage)?],
         })
     }
 
@@ -183,10 +180,8 @@ impl Attached {
         let recorded = self.recorded();
         let views = recorded.attachments.views(layer);
         let color = |view| {
-            let ops = wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                store: wgpu::StoreOp::Store,
-            };
+            let ops =
+                wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
             Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
         };
         let load = if frame.surfaces.count(Pass::Opaque) > 0 {

@@ -2,11 +2,11 @@
 
 use pellucid_core::{Fragment, Layers};
 
+use crate::GpuError;
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
 use crate::pass::gather::{opaque_surfaces, unpack};
 use crate::readback::read_buffer;
-use crate::GpuError;
 
 /// The layers so far, nearest first: for each pixel that has one, its place in the window and the fragment.
 #[derive(Debug, Default)]
@@ -19,9 +19,8 @@ impl Gathering {
     pub(super) fn add(&mut self, frame: &mut Frame<'_>, layer: &wgpu::Buffer, pixels: u64) -> Result<(), GpuError> {
         let stored: Vec<[u32; 4]> = read_buffer(frame, layer, 0, pixels)?;
         let there = stored.into_iter().enumerate().filter(|(_, words)| words[3] != 0);
-        self.layers.push(
-            there.map(|(i, [rg, ba, depth, primitive])| (i, unpack([rg, ba, depth, primitive - 1]))).collect(),
-        );
+        self.layers
+            .push(there.map(|(i, [rg, ba, depth, primitive])| (i, unpack([rg, ba, depth, primitive - 1]))).collect());
         Ok(())
     }
 
@@ -32,7 +31,13 @@ impl Gathering {
             pixels[pixel].push(fragment);
         }
         let mut end = 0;
-        let ends = pixels.iter().map(|fragments| { end += fragments.len() as u32; end }).collect();
+        let ends = pixels
+            .iter()
+            .map(|fragments| {
+                end += fragments.len() as u32;
+                end
+            })
+            .collect();
         let fragments = pixels.into_iter().flatten().collect();
         let opaque = opaque_surfaces(frame, window)?;
         let Window { left, top, width, height } = window;

@@ -148,7 +148,6 @@ impl Capture for Peel {
                 if passes % submitted_together == 0 {
                     frame.submit()?;
                     gpu.wait()?;
-                    if passes % 40 == 0 { eprintln!("DBG {passes} {draws} {:?}", std::fs::read_to_string("/proc/self/status").unwrap().lines().find(|l| l.starts_with("VmRSS"))); }
                 }
             }
             progress = state.progress(frame)?;
