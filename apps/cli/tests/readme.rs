@@ -44,7 +44,9 @@ fn resolves_scenes_techniques_and_commands() {
     }
     let help = Workplace::new().succeed("--help").stdout;
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    for command in commands.filter_map(|line| line.split_whitespace().next()).filter(|command| *command != "help") {
+    // A command's own line is indented by two; longer descriptions go on further to the right.
+    let commands = commands.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next());
+    for command in commands.filter(|command| *command != "help") {
         assert!(README.contains(&format!("`pellucid {command}")), "{command}");
     }
 }
