@@ -34,9 +34,9 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Show what is in a scene, and how many layers lie behind the pixels of a view
     Info(Box<InfoArgs>),
-    /// Render a view with several techniques, and report side by side what they show, take and hold
+    /// Render a view with several techniques, and report them side by side
     Compare(Box<CompareArgs>),
-    /// Hold this device against the oracle: built-in scenes, exact techniques, resolves
+    /// Hold this device against the oracle
     Verify(VerifyArgs),
     /// List the built-in scenes and their parameters
     Scenes(ListArgs),

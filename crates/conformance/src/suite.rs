@@ -64,23 +64,23 @@ const fn from(
 }
 
 /// The suite. Sizes are no multiples of a tile; every built-in scene is in it, as large as the oracle can take: all of them
-/// together are three hundred million triangles against pixels.
+/// together are less than two hundred million triangles against pixels.
 pub const CASES: &[Case] = &[
     // Everything at once, as it comes.
-    usual("@gallery", (27, 15)),
+    usual("@gallery", (19, 11)),
     usual("@boxes:n=4", (131, 75)),
     usual("@grids:layers=5,tessellation=12", (65, 65)),
     usual("@blocks:n=40", (77, 61)),
     usual("@hairball:strands=40,segments=12", (63, 47)),
-    usual("@glass:shells=2,sides=12", (31, 23)),
+    usual("@glass:shells=2,sides=12", (23, 17)),
     // No order of whole primitives is right.
     usual("@cyclic", (119, 83)),
     // Opaque before, between and behind translucent; alpha-masked leaves; nothing but opaque.
     usual("@spheres:n=24,subdivisions=2", (67, 49)),
-    usual("@tree:leaves=100", (23, 29)),
+    usual("@tree:leaves=100", (17, 23)),
     usual("@teapot:tessellation=5", (67, 45)),
     // Opaque and masked surfaces become layers.
-    translucent("@tree:leaves=100", (23, 29), 0.4),
+    translucent("@tree:leaves=100", (17, 23), 0.4),
     translucent("@teapot:tessellation=5", (67, 45), 0.3),
     translucent("@spheres:n=24,subdivisions=2", (67, 49), 0.6),
     // Depth complexity beyond any fixed number of layers.

@@ -50,7 +50,7 @@ fn cpu_equals_oracle_in_every_case() {
 fn the_oracle_passes_its_own_suite_and_so_does_the_cpu() {
     for technique in [Technique::Oracle, Technique::Cpu] {
         let candidate = Candidate::new(technique, Renderer::new());
-        for case in CASES.iter().step_by(5) {
+        for case in CASES.iter().filter(|case| ["@cyclic", "@teapot:tessellation=5"].contains(&case.source)) {
             let prepared = case.prepare().unwrap();
             for check in Check::ALL {
                 let comparison = prepared.run(check, &candidate).unwrap();
