@@ -56,19 +56,22 @@ fn main() {
     let passes = sources("pass");
     let mut linked = BTreeMap::new();
     for stem in techniques.keys() {
-        linked.insert(stem.to_uppercase(), link("technique", stem, None));
+        linked.insert(stem.to_uppercase(), link("technique", stem));
     }
     for (stem, source) in &passes {
         if !source.contains("package::lfb") {
-            linked.insert(stem.to_uppercase(), link("pass", stem, None));
+            linked.insert(stem.to_uppercase(), link("pass", stem));
             continue;
         }
         for (technique, technique_source) in &techniques {
             if technique_source.contains("fn fragment_count(") {
                 // Random access to the fragments of a pixel, which not every structure has.
                 let random_access = technique_source.contains("fn slot_at(");
+                // What is sorted is a reference to a fragment, where it cannot be moved itself.
+                let by_key = technique_source.contains("fn load_key(");
+                let features = [("random_access", random_access), ("by_key", by_key)];
                 let name = format!("{stem}_{technique}").to_uppercase();
-                linked.insert(name, link("pass", stem, Some((technique, random_access))));
+                linked.insert(name, compile(&path("pass", stem), Some(path("technique", technique)), &features));
             }
         }
     }
@@ -112,16 +115,15 @@ fn sources(folder: &str) -> BTreeMap<String, String> {
     sources
 }
 
-fn link(folder: &str, stem: &str, technique: Option<(&String, bool)>) -> String {
-    let random_access = technique.is_some_and(|(_, random_access)| random_access);
-    let lfb = technique.map(|(stem, _)| path("technique", stem));
-    compile(&path(folder, stem), lfb, &[("random_access", random_access)])
+fn link(folder: &str, stem: &str) -> String {
+    compile(&path(folder, stem), None, &[])
 }
 
 /// Links with the LFB that has payloads of so many words.
 fn link_interface(folder: &str, stem: &str, words: u32, read_only: bool) -> String {
     let payload = |n| (["payload_1", "payload_2", "payload_3", "payload_4"][n as usize - 1], n == words);
-    let features = [("random_access", true), ("read_only", read_only), payload(1), payload(2), payload(3), payload(4)];
+    let access = [("random_access", true), ("by_key", false), ("read_only", read_only)];
+    let features: Vec<_> = access.into_iter().chain((1..=4).map(payload)).collect();
     compile(&path(folder, stem), Some(path("lfb", "stored")), &features)
 }
 

@@ -79,7 +79,7 @@ impl Technique {
             Self::Peel => "44 B x pixels, 60 B for gelly and blend:corrected",
             Self::Linear => "4 B x pixels + 16 B x fragments",
             Self::List => "8 B x pixels + 20 B x fragments",
-            Self::ABuffer => "4 B x pixels + 16 B x pixels x greatest depth complexity",
+            Self::ABuffer => "4 B x pixels + 16 B (20 B in textures) x pixels x greatest depth complexity",
             Self::Pages => "8 B x pixels + 68 B x pages of 4 fragments",
         }
     }

@@ -273,7 +273,8 @@ impl Memory {
 
 fn texture_bytes(texture: &wgpu::Texture) -> u64 {
     let texel_bytes = texture.format().block_copy_size(None).unwrap_or(4);
-    u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel_bytes)
+    let texels = u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texture.depth_or_array_layers());
+    texels * u64::from(texel_bytes)
 }
 
 fn total(needs: &[(&'static str, u64)]) -> u64 {

@@ -15,7 +15,7 @@ use crate::pass::opaque::OpaquePass;
 use crate::pass::picture::{self, PictureGroup, Totals};
 use crate::readback::{read_buffer, read_texture};
 use crate::surface::{DrawGroups, SurfaceLayouts, Surfaces};
-use crate::technique::{self, Capture, Layouts, Outcome};
+use crate::technique::{self, Capture, Layouts, Outcome, Storage};
 use crate::upload::SceneUpload;
 use crate::{Context, ContextOptions, GpuError};
 
@@ -30,6 +30,7 @@ pub struct GpuRenderer {
     picture_layout: BindGroupLayout,
     budget_bytes: u64,
     max_layers: Option<u32>,
+    storage: Storage,
     kept: Mutex<Kept>,
 }
 
@@ -78,6 +79,7 @@ impl GpuRenderer {
             picture_layout,
             budget_bytes: DEFAULT_BUDGET_BYTES,
             max_layers: None,
+            storage: Storage::default(),
             kept: Mutex::new(kept),
         })
     }
@@ -94,6 +96,16 @@ impl GpuRenderer {
     #[must_use]
     pub fn max_layers(mut self, max_layers: Option<u32>) -> Self {
         self.max_layers = max_layers;
+        self
+    }
+
+    /// The same renderer with another storage for the A-buffer's fragments. The picture is the same in either.
+    #[must_use]
+    pub fn storage(mut self, storage: Storage) -> Self {
+        self.storage = storage;
+        let kept = self.kept.get_mut().unwrap_or_else(PoisonError::into_inner);
+        kept.techniques.retain(|(technique, _)| *technique != Technique::ABuffer);
+        kept.memory.clear();
         self
     }
 
@@ -167,7 +179,7 @@ impl GpuRenderer {
         let gpu = &self.gpu;
         let layouts = Layouts { surfaces: &self.surfaces, picture: &self.picture_layout };
         if !kept.techniques.iter().any(|(name, _)| *name == technique) {
-            kept.techniques.push((technique, technique::new(gpu, layouts, technique)?));
+            kept.techniques.push((technique, technique::new(gpu, layouts, technique, self.storage)?));
         }
         if kept.last.replace(technique) != Some(technique) {
             kept.memory.clear();

@@ -1,12 +1,19 @@
 //! The A-buffer (Crassin 2010): an array of fragments for each pixel, all of the same length, filled in one pass over the
-//! geometry behind an atomic counter for each pixel. Twin: `shaders/technique/abuffer.wesl`.
+//! geometry behind an atomic counter for each pixel. Twins: `shaders/technique/abuffer.wesl`, `abuffer_texture.wesl`.
 //!
 //! The article fixes the length, and loses what lies beyond it. Here it is the greatest count of the last frame; counters
 //! count on beyond it, and a capture that did not fit is repeated with the greatest of them. One deep pixel makes all
 //! arrays long: where that exceeds the budget, the window is split so that deep pixels are among few others.
+//!
+//! As in the article, fragments are kept in memory or in an array of textures. In memory they lie layer by layer too, so
+//! that neighbouring pixels write side by side. WebGPU's floor cannot read and write one texture in a pass: from textures
+//! a table of layer numbers is sorted, 4 bytes more for each place. Rejected: a second array of textures to sort into.
 
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, ComputePipeline, ShaderStages};
+use wgpu::{
+    BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages, StorageTextureAccess, TextureFormat,
+    TextureSampleType, TextureUsages,
+};
 
 use super::growth::{KnownNeeds, most_that_fits};
 use super::{Capture, Layouts, Outcome};
@@ -19,16 +26,34 @@ use crate::{Context, GpuError, shaders};
 
 /// Bytes of a stored fragment.
 const FRAGMENT_BYTES: u64 = 16;
+/// Bytes of a layer's number.
+const ORDER_BYTES: u64 = 4;
+/// Of a texture's texels: a stored fragment.
+const FORMAT: TextureFormat = TextureFormat::Rgba32Uint;
 /// Length of the arrays as long as nothing is known.
 const FIRST_GUESS: u64 = 8;
 
 const COUNTS: &str = "counts";
 const FRAGMENTS: &str = "fragments";
+const ORDER: &str = "order";
+const LAYERS: &str = "layers";
+
+/// Where the A-buffer keeps fragments.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Storage {
+    /// In a buffer, 16 bytes for each pixel and layer.
+    #[default]
+    Buffer,
+    /// In an array of textures, 20 bytes for each pixel and layer.
+    Texture,
+}
 
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct ABuffer {
-    layout: BindGroupLayout,
+    storage: Storage,
+    /// Of the capture, and of what comes after it.
+    layouts: [BindGroupLayout; 2],
     capture: SurfacePipelines,
     reduce: ComputePipeline,
     ordered: OrderedPasses,
@@ -39,70 +64,171 @@ pub(crate) struct ABuffer {
 /// What came of a capture.
 struct Captured {
     counts: wgpu::Buffer,
-    group: wgpu::BindGroup,
+    group: BindGroup,
     /// Most fragments at one pixel.
     greatest: u64,
     /// Whether there was room for so many.
     is_whole: bool,
 }
 
+/// An array of textures with room for so many layers of every pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shape {
+    array_layers: u32,
+    /// Texels of a pixel, below each other, where there are more layers than a texture may have.
+    rows: u32,
+}
+
+impl Shape {
+    fn new(gpu: &Context, layers: u64) -> Self {
+        let rows = layers.div_ceil(gpu.limits.max_texture_array_layers.into()).max(1);
+        Self { array_layers: layers.div_ceil(rows).max(1) as u32, rows: rows as u32 }
+    }
+
+    fn layers(self) -> u64 {
+        u64::from(self.array_layers) * u64::from(self.rows)
+    }
+}
+
 impl ABuffer {
-    pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
+    pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, storage: Storage) -> Self {
         let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("abuffer"),
-            entries: &[0, 1].map(|binding| storage_entry(binding, visibility, false)),
-        });
+        let own_layout = |label, last: Option<BindingType>| {
+            let last = last.map(|ty| wgpu::BindGroupLayoutEntry { binding: 2, visibility, ty, count: None });
+            let buffers = [0, 1].map(|binding| storage_entry(binding, visibility, false));
+            let entries: Vec<_> = buffers.into_iter().chain(last).collect();
+            gpu.device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        let view_dimension = wgpu::TextureViewDimension::D2Array;
+        let (written, read) = match storage {
+            Storage::Buffer => (None, None),
+            Storage::Texture => (
+                Some(BindingType::StorageTexture {
+                    access: StorageTextureAccess::WriteOnly,
+                    format: FORMAT,
+                    view_dimension,
+                }),
+                Some(BindingType::Texture {
+                    sample_type: TextureSampleType::Uint,
+                    view_dimension,
+                    multisampled: false,
+                }),
+            ),
+        };
+        let layouts_of = [own_layout("abuffer, captured", written), own_layout("abuffer", read)];
+        let (wgsl, ordered_shaders) = match storage {
+            Storage::Buffer => (
+                shaders::ABUFFER,
+                LfbShaders {
+                    sort: shaders::SORT_ABUFFER,
+                    resolve: shaders::RESOLVE_ABUFFER,
+                    gather: shaders::GATHER_ABUFFER,
+                },
+            ),
+            Storage::Texture => (
+                shaders::ABUFFER_TEXTURE,
+                LfbShaders {
+                    sort: shaders::SORT_ABUFFER_TEXTURE,
+                    resolve: shaders::RESOLVE_ABUFFER_TEXTURE,
+                    gather: shaders::GATHER_ABUFFER_TEXTURE,
+                },
+            ),
+        };
         let capture = SurfacePass {
             label: "main render",
-            wgsl: shaders::ABUFFER,
+            wgsl,
             plain: "capture",
             varied: "capture_varied",
             ignores_color: false,
             targets: &[],
             depth_stencil: depth_state(false, false),
-            own_layout: Some(&layout),
-        };
-        let ordered_shaders = LfbShaders {
-            sort: shaders::SORT_ABUFFER,
-            resolve: shaders::RESOLVE_ABUFFER,
-            gather: shaders::GATHER_ABUFFER,
+            own_layout: Some(&layouts_of[0]),
         };
         let module = shader(gpu, "greatest count", shaders::ABUFFER);
-        let group_layouts = [Some(layouts.picture), None, None, Some(&layout)];
+        let group_layouts = [Some(layouts.picture), None, None, Some(&layouts_of[1])];
         Self {
+            storage,
             capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
             reduce: compute_pipeline(gpu, "greatest count", &module, "reduce", &group_layouts, &[]),
-            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
-            layout,
+            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layouts_of[1]),
+            layouts: layouts_of,
             guess: FIRST_GUESS,
             known: KnownNeeds::default(),
         }
     }
 
-    /// All buffers of a window with so many pixels and layers.
-    fn needs(pixels: u64, layers: u64) -> [(&'static str, u64); 2] {
-        [(COUNTS, (pixels + 1) * 4), (FRAGMENTS, pixels * layers * FRAGMENT_BYTES)]
+    /// Everything for so many pixels and layers. Textures are told one by one, as each is its own thing to the limits.
+    fn needs(&self, gpu: &Context, pixels: u64, layers: u64) -> Vec<(&'static str, u64)> {
+        let mut needs = vec![(COUNTS, (pixels + 1) * 4)];
+        match self.storage {
+            Storage::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
+            Storage::Texture => {
+                let shape = Shape::new(gpu, layers);
+                needs.push((ORDER, pixels * shape.layers() * ORDER_BYTES));
+                let texture_bytes = pixels * u64::from(shape.rows) * FRAGMENT_BYTES;
+                needs.extend((0..shape.array_layers).map(|_| (LAYERS, texture_bytes)));
+            }
+        }
+        needs
+    }
+
+    /// Whether so many pixels and layers fit, in rows of so many pixels.
+    fn fits(&self, frame: &Frame<'_>, width: u32, pixels: u64, layers: u64) -> bool {
+        let height = pixels.div_ceil(width.into());
+        let is_too_high = self.storage == Storage::Texture
+            && height * u64::from(Shape::new(frame.gpu, layers).rows)
+                > frame.gpu.limits.max_texture_dimension_2d.into();
+        !is_too_high && frame.memory.fits(frame.gpu, &self.needs(frame.gpu, pixels, layers))
+    }
+
+    /// Makes what holds so many layers of a window: what is bound in the capture and after it, and how many layers that is.
+    fn allocate(
+        &self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        layers: u64,
+    ) -> Result<(wgpu::Buffer, [BindGroup; 2], u64), GpuError> {
+        let (gpu, pixels) = (frame.gpu, window.pixels());
+        let mut needs: Vec<(&'static str, u64)> = Vec::new();
+        for (name, bytes) in self.needs(gpu, pixels, layers) {
+            match needs.last_mut().filter(|(last, _)| *last == name) {
+                Some((_, sum)) => *sum += bytes,
+                None => needs.push((name, bytes)),
+            }
+        }
+        frame.memory.make_room(&needs);
+        let counts = frame.memory.buffer(gpu, needs[0].0, needs[0].1)?;
+        let table = frame.memory.buffer(gpu, needs[1].0, needs[1].1)?;
+        let (texture, there_are) = match self.storage {
+            Storage::Buffer => (None, table.size() / FRAGMENT_BYTES / pixels),
+            Storage::Texture => {
+                let shape = Shape::new(gpu, layers);
+                let texture = frame.memory.texture(gpu, LAYERS, &texture_of(window, shape))?;
+                (Some(texture.create_view(&array_view())), shape.layers())
+            }
+        };
+        let groups = self.layouts.each_ref().map(|layout| {
+            let buffers = [&counts, &table].map(wgpu::Buffer::as_entire_binding);
+            let resources = buffers.into_iter().chain(texture.as_ref().map(wgpu::BindingResource::TextureView));
+            let entries: Vec<_> =
+                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("abuffer"),
+                layout,
+                entries: &entries,
+            })
+        });
+        Ok((counts, groups, there_are))
     }
 
     /// Captures with room for so many layers.
     fn capture(&mut self, frame: &mut Frame<'_>, window: Window, layers: u64) -> Result<Captured, GpuError> {
+        let (counts, [captured, group], there_are) = self.allocate(frame, window, layers)?;
         let (gpu, pixels) = (frame.gpu, window.pixels());
-        let needs = Self::needs(pixels, layers);
-        frame.memory.make_room(&needs);
-        let [counts, fragments] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
-        let (counts, fragments) = (counts?, fragments?);
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("abuffer"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: counts.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: fragments.as_entire_binding() },
-            ],
-        });
-        frame.zero("zero", &counts, needs[0].1)?;
+        frame.zero("zero", &counts, (pixels + 1) * 4)?;
         let mut pass = frame.capture_pass("main render", window)?;
-        pass.set_bind_group(3, &group, &[]);
+        pass.set_bind_group(3, &captured, &[]);
         frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.capture);
         drop(pass);
         let mut pass = frame.compute_pass("greatest count")?;
@@ -110,17 +236,16 @@ impl ABuffer {
         dispatch_window(&mut pass, frame, window, &group);
         drop(pass);
         let greatest = u64::from(read_buffer::<u32>(frame, &counts, pixels, 1)?[0]);
-        let is_whole = greatest <= fragments.size() / FRAGMENT_BYTES / pixels;
-        Ok(Captured { counts, group, greatest, is_whole })
+        Ok(Captured { counts, group, greatest, is_whole: greatest <= there_are })
     }
 
     /// Parts of a window that fit, now that it is known how many fragments each pixel has.
     fn split(&mut self, frame: &mut Frame<'_>, window: Window, counts: &wgpu::Buffer) -> Result<Outcome, GpuError> {
         let counts: Vec<u32> = read_buffer(frame, counts, 0, window.pixels())?;
-        let fits = |pixels, layers| frame.memory.fits(frame.gpu, &Self::needs(pixels, layers));
+        let fits = |pixels, layers| self.fits(frame, window.width, pixels, layers);
         let parts = window
             .parts_by(&counts, u64::max, fits)
-            .map_err(|layers| frame.memory.refusal(frame.gpu, &Self::needs(1, layers)))?;
+            .map_err(|layers| frame.memory.refusal(frame.gpu, &self.needs(frame.gpu, 1, layers)))?;
         let greatest = |counts: &[u32]| counts.iter().copied().max().map_or(0, u64::from);
         self.known.learn(window, &counts, &parts, greatest);
         Ok(Outcome::Split(parts))
@@ -132,9 +257,8 @@ impl Capture for ABuffer {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let known = self.known.take(window);
         let wanted = known.unwrap_or(self.guess);
-        let Some(mut room) = most_that_fits(wanted, |layers| frame.memory.fits(gpu, &Self::needs(pixels, layers)))
-        else {
-            return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
+        let Some(mut room) = most_that_fits(wanted, |layers| self.fits(frame, window.width, pixels, layers)) else {
+            return frame.memory.halves(gpu, window, &self.needs(gpu, pixels, 1));
         };
         loop {
             let captured = self.capture(frame, window, room)?;
@@ -147,9 +271,31 @@ impl Capture for ABuffer {
             }
             frame.rerenders += 1;
             room = captured.greatest;
-            if !frame.memory.fits(gpu, &Self::needs(pixels, room)) {
+            if !self.fits(frame, window.width, pixels, room) {
                 return self.split(frame, window, &captured.counts);
             }
         }
     }
+}
+
+fn texture_of(window: Window, shape: Shape) -> wgpu::TextureDescriptor<'static> {
+    wgpu::TextureDescriptor {
+        label: Some(LAYERS),
+        size: wgpu::Extent3d {
+            width: window.width,
+            height: window.height * shape.rows,
+            depth_or_array_layers: shape.array_layers,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FORMAT,
+        usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    }
+}
+
+/// An array even if it has one layer alone.
+fn array_view() -> wgpu::TextureViewDescriptor<'static> {
+    wgpu::TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() }
 }

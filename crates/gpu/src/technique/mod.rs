@@ -11,6 +11,7 @@ mod list;
 mod pages;
 mod peel;
 
+pub use abuffer::Storage;
 use pellucid_core::Technique;
 use wgpu::BindGroupLayout;
 
@@ -44,12 +45,17 @@ pub(crate) struct Layouts<'a> {
 }
 
 /// The long-lived half of a technique.
-pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, technique: Technique) -> Result<Box<dyn Capture>, GpuError> {
+pub(crate) fn new(
+    gpu: &Context,
+    layouts: Layouts<'_>,
+    technique: Technique,
+    storage: Storage,
+) -> Result<Box<dyn Capture>, GpuError> {
     match technique {
         Technique::Alpha => Ok(Box::new(alpha::Alpha::new(gpu, layouts))),
         Technique::Linear => Ok(Box::new(linear::Linear::new(gpu, layouts))),
         Technique::Pages => Ok(Box::new(pages::Pages::new(gpu, layouts))),
-        Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts))),
+        Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts, storage))),
         Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
         Technique::Peel => Ok(Box::new(peel::Peel::new(gpu, layouts))),
         Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
