@@ -59,8 +59,7 @@ pub(crate) struct Surfaces<'a> {
 /// Group 0 of surfaces, and the buffers in it. Kept from frame to frame, so that what was recorded with it can be
 /// replayed: a frame only writes into the buffers.
 ///
-/// One group for each instance, as they are kept anyway: with one for all and dynamic offsets, lavapipe loses some 150 KB
-/// of memory with every draw.
+/// One group for each instance, as they are kept anyway, rather than one for all with dynamic offsets.
 #[derive(Debug)]
 pub(crate) struct DrawGroups {
     pub(crate) frame_data: wgpu::Buffer,
@@ -144,7 +143,10 @@ impl SurfaceLayouts {
         let layout = |label, entries: &[_]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
-        let frame = layout("frame and draw", &[uniform(0), uniform(1), texture(2, wgpu::TextureSampleType::Depth)]);
+        let frame = layout(
+            "frame and draw",
+            &[uniform(0), storage_entry(1, both, true), texture(2, wgpu::TextureSampleType::Depth)],
+        );
         let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, both, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
         let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
@@ -328,7 +330,7 @@ impl<'a> Surfaces<'a> {
 
 /// Bytes from the data of one draw to the next.
 fn draw_stride(gpu: &Context) -> usize {
-    size_of::<DrawData>().next_multiple_of(gpu.limits.min_uniform_buffer_offset_alignment as usize)
+    size_of::<DrawData>().next_multiple_of(gpu.limits.min_storage_buffer_offset_alignment as usize)
 }
 
 impl DrawGroups {
@@ -354,9 +356,10 @@ impl DrawGroups {
         bytes: u64,
         opaque_depth: &wgpu::TextureView,
     ) -> Result<Self, GpuError> {
-        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let frame_data = gpu.buffer("the frame", size_of::<FrameData>() as u64, usage)?;
-        let instances = gpu.buffer("the instances", bytes, usage)?;
+        let (uniform, storage) = (wgpu::BufferUsages::UNIFORM, wgpu::BufferUsages::STORAGE);
+        let copied = wgpu::BufferUsages::COPY_DST;
+        let frame_data = gpu.buffer("the frame", size_of::<FrameData>() as u64, uniform | copied)?;
+        let instances = gpu.buffer("the instances", bytes, storage | copied)?;
         let draw_data = |offset| {
             wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                 buffer: &instances,
