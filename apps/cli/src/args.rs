@@ -231,6 +231,10 @@ pub(crate) struct CaptureArgs {
     /// Bytes that a GPU capture may hold, such as 512M; the CPU holds one tile a thread and needs no bound
     #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     pub(crate) budget: Option<String>,
+
+    /// Where abuffer keeps fragments
+    #[arg(long, value_name = "WHERE", default_value = "buffer")]
+    pub(crate) storage: StorageArg,
 }
 
 #[derive(Debug, clap::Args)]
@@ -256,6 +260,12 @@ pub(crate) enum Side {
     Right,
     Top,
     Bottom,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StorageArg {
+    Buffer,
+    Texture,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use glam::Vec4;
 use pellucid::core::view::THICKNESS_OVER_RADIUS;
+use pellucid::gpu::Storage;
 use pellucid::{ImageFormat, Loaded, Renderer, Resolve, Scene, Shading, Technique, View};
 
 use crate::UsageError;
-use crate::args::{Backend, CaptureArgs, InfoArgs, RenderArgs, ShadingArg, ViewArgs};
+use crate::args::{Backend, CaptureArgs, InfoArgs, RenderArgs, ShadingArg, StorageArg, ViewArgs};
 use crate::camera::CameraPlan;
 use crate::values;
 
@@ -71,6 +72,7 @@ pub(crate) struct ViewPlan {
 pub(crate) struct CapturePlan {
     technique: Technique,
     threads: usize,
+    storage: Storage,
 }
 
 /// Most pictures of a turntable: four digits in their names.
@@ -192,11 +194,15 @@ impl CapturePlan {
                 "this build has no GPU techniques yet; leave out --backend gpu to render on the CPU, exactly as well"
             );
         }
-        Ok(Self { technique, threads: threads as usize })
+        let storage = match args.storage {
+            StorageArg::Buffer => Storage::Buffer,
+            StorageArg::Texture => Storage::Texture,
+        };
+        Ok(Self { technique, threads: threads as usize, storage })
     }
 
     pub(crate) fn renderer(&self) -> Renderer {
-        Renderer::new().technique(self.technique).threads(self.threads)
+        Renderer::new().technique(self.technique).threads(self.threads).storage(self.storage)
     }
 }
 

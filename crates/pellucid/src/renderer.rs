@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use pellucid_core::{Frame, Layers, Resolve, Scene, Stats, Technique, View, oracle};
 use pellucid_cpu::CpuRenderer;
 #[cfg(feature = "gpu")]
-use pellucid_gpu::{ContextOptions, GpuRenderer};
+use pellucid_gpu::{ContextOptions, GpuRenderer, Storage};
 
 use crate::Error;
 
@@ -16,6 +16,8 @@ pub struct Renderer {
     technique: Technique,
     budget_bytes: Option<u64>,
     cpu: CpuRenderer,
+    #[cfg(feature = "gpu")]
+    storage: Storage,
     /// Opened with the first frame that needs it.
     #[cfg(feature = "gpu")]
     gpu: OnceLock<GpuRenderer>,
@@ -34,6 +36,8 @@ impl Renderer {
             technique: Technique::Cpu,
             budget_bytes: None,
             cpu: CpuRenderer::new(0),
+            #[cfg(feature = "gpu")]
+            storage: Storage::default(),
             #[cfg(feature = "gpu")]
             gpu: OnceLock::new(),
         }
@@ -62,6 +66,15 @@ impl Renderer {
         {
             self.gpu = OnceLock::new();
         }
+        self
+    }
+
+    /// The same renderer with another storage for the A-buffer's fragments. The picture is the same in either.
+    #[cfg(feature = "gpu")]
+    #[must_use]
+    pub fn storage(mut self, storage: Storage) -> Self {
+        self.storage = storage;
+        self.gpu = OnceLock::new();
         self
     }
 
@@ -114,7 +127,8 @@ impl Renderer {
         if let Some(gpu) = self.gpu.get() {
             return Ok(gpu);
         }
-        let mut gpu = GpuRenderer::new(&ContextOptions { allow_software: true, ..ContextOptions::default() })?;
+        let mut gpu = GpuRenderer::new(&ContextOptions { allow_software: true, ..ContextOptions::default() })?
+            .storage(self.storage);
         if let Some(budget_bytes) = self.budget_bytes {
             gpu = gpu.budget_bytes(budget_bytes);
         }
