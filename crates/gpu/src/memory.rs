@@ -123,6 +123,11 @@ impl Estimate {
         (self.fragments_per_pixel * window.pixels() as f64 * Self::SLACK).ceil().max(1.0) as u64
     }
 
+    /// Fragments to make room for where there were so many last.
+    pub(crate) fn with_slack(fragments: u64) -> u64 {
+        (fragments as f64 * Self::SLACK).ceil().max(1.0) as u64
+    }
+
     /// Takes note of how many there really were.
     pub fn learn(&mut self, window: &Window, fragments: u64) {
         self.fragments_per_pixel = fragments as f64 / window.pixels() as f64;

@@ -104,6 +104,14 @@ fn budgets_far_below_the_guess_are_kept() {
                 assert!(frame.stats.peak_bytes <= budget_bytes, "{what}");
                 assert!(frame.image == expected.image, "{what}");
                 assert_eq!(frame.stats.fragments, expected.stats.fragments, "{what}");
+                let again = gpu.render(&scene, &view, Resolve::Blend, technique).unwrap();
+                assert!(
+                    again.image == expected.image && again.stats.peak_bytes <= budget_bytes,
+                    "{what}, second frame"
+                );
+                if budget_bytes == whole / 2 {
+                    assert_eq!(again.stats.rerenders, 0, "{what}: nothing is captured in vain twice");
+                }
             }
         }
     }

@@ -15,7 +15,7 @@ use wgpu::{
     TextureSampleType, TextureUsages,
 };
 
-use super::growth::{KnownNeeds, most_that_fits};
+use super::growth::{Splits, most_that_fits};
 use super::{Capture, Layouts, Outcome};
 use crate::frame::Frame;
 use crate::memory::Window;
@@ -58,7 +58,7 @@ pub(crate) struct ABuffer {
     reduce: ComputePipeline,
     ordered: OrderedPasses,
     guess: u64,
-    known: KnownNeeds,
+    splits: Splits,
 }
 
 /// What came of a capture.
@@ -87,6 +87,32 @@ impl Shape {
 
     fn layers(self) -> u64 {
         u64::from(self.array_layers) * u64::from(self.rows)
+    }
+}
+
+impl Storage {
+    /// Everything for so many pixels and layers. Textures are told one by one, as each is its own thing to the limits.
+    fn needs(self, gpu: &Context, pixels: u64, layers: u64) -> Vec<(&'static str, u64)> {
+        let mut needs = vec![(COUNTS, (pixels + 1) * 4)];
+        match self {
+            Self::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
+            Self::Texture => {
+                let shape = Shape::new(gpu, layers);
+                needs.push((ORDER, pixels * shape.layers() * ORDER_BYTES));
+                let texture_bytes = pixels * u64::from(shape.rows) * FRAGMENT_BYTES;
+                needs.extend((0..shape.array_layers).map(|_| (LAYERS, texture_bytes)));
+            }
+        }
+        needs
+    }
+
+    /// Whether so many pixels and layers fit, in rows of so many pixels.
+    fn fits(self, frame: &Frame<'_>, width: u32, pixels: u64, layers: u64) -> bool {
+        let height = pixels.div_ceil(width.into());
+        let is_too_high = self == Self::Texture
+            && height * u64::from(Shape::new(frame.gpu, layers).rows)
+                > frame.gpu.limits.max_texture_dimension_2d.into();
+        !is_too_high && frame.memory.fits(frame.gpu, &self.needs(frame.gpu, pixels, layers))
     }
 }
 
@@ -154,32 +180,8 @@ impl ABuffer {
             ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layouts_of[1]),
             layouts: layouts_of,
             guess: FIRST_GUESS,
-            known: KnownNeeds::default(),
+            splits: Splits::default(),
         }
-    }
-
-    /// Everything for so many pixels and layers. Textures are told one by one, as each is its own thing to the limits.
-    fn needs(&self, gpu: &Context, pixels: u64, layers: u64) -> Vec<(&'static str, u64)> {
-        let mut needs = vec![(COUNTS, (pixels + 1) * 4)];
-        match self.storage {
-            Storage::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
-            Storage::Texture => {
-                let shape = Shape::new(gpu, layers);
-                needs.push((ORDER, pixels * shape.layers() * ORDER_BYTES));
-                let texture_bytes = pixels * u64::from(shape.rows) * FRAGMENT_BYTES;
-                needs.extend((0..shape.array_layers).map(|_| (LAYERS, texture_bytes)));
-            }
-        }
-        needs
-    }
-
-    /// Whether so many pixels and layers fit, in rows of so many pixels.
-    fn fits(&self, frame: &Frame<'_>, width: u32, pixels: u64, layers: u64) -> bool {
-        let height = pixels.div_ceil(width.into());
-        let is_too_high = self.storage == Storage::Texture
-            && height * u64::from(Shape::new(frame.gpu, layers).rows)
-                > frame.gpu.limits.max_texture_dimension_2d.into();
-        !is_too_high && frame.memory.fits(frame.gpu, &self.needs(frame.gpu, pixels, layers))
     }
 
     /// Makes what holds so many layers of a window: what is bound in the capture and after it, and how many layers that is.
@@ -191,7 +193,7 @@ impl ABuffer {
     ) -> Result<(wgpu::Buffer, [BindGroup; 2], u64), GpuError> {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let mut needs: Vec<(&'static str, u64)> = Vec::new();
-        for (name, bytes) in self.needs(gpu, pixels, layers) {
+        for (name, bytes) in self.storage.needs(gpu, pixels, layers) {
             match needs.last_mut().filter(|(last, _)| *last == name) {
                 Some((_, sum)) => *sum += bytes,
                 None => needs.push((name, bytes)),
@@ -242,12 +244,12 @@ impl ABuffer {
     /// Parts of a window that fit, now that it is known how many fragments each pixel has.
     fn split(&mut self, frame: &mut Frame<'_>, window: Window, counts: &wgpu::Buffer) -> Result<Outcome, GpuError> {
         let counts: Vec<u32> = read_buffer(frame, counts, 0, window.pixels())?;
-        let fits = |pixels, layers| self.fits(frame, window.width, pixels, layers);
+        let fits = |pixels, layers| self.storage.fits(frame, window.width, pixels, layers);
         let parts = window
             .parts_by(&counts, u64::max, fits)
-            .map_err(|layers| frame.memory.refusal(frame.gpu, &self.needs(frame.gpu, 1, layers)))?;
+            .map_err(|layers| frame.memory.refusal(frame.gpu, &self.storage.needs(frame.gpu, 1, layers)))?;
         let greatest = |counts: &[u32]| counts.iter().copied().max().map_or(0, u64::from);
-        self.known.learn(window, &counts, &parts, greatest);
+        self.splits.split(window, &counts, &parts, greatest);
         Ok(Outcome::Split(parts))
     }
 }
@@ -255,15 +257,22 @@ impl ABuffer {
 impl Capture for ABuffer {
     fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
         let (gpu, pixels) = (frame.gpu, window.pixels());
-        let known = self.known.take(window);
+        let parts =
+            self.splits.parts_of(window, u64::max, |layers| self.storage.fits(frame, window.width, pixels, layers));
+        if let Some(parts) = parts {
+            return Ok(Outcome::Split(parts));
+        }
+        let known = self.splits.need(window);
         let wanted = known.unwrap_or(self.guess);
-        let Some(mut room) = most_that_fits(wanted, |layers| self.fits(frame, window.width, pixels, layers)) else {
-            return frame.memory.halves(gpu, window, &self.needs(gpu, pixels, 1));
+        let Some(mut room) = most_that_fits(wanted, |layers| self.storage.fits(frame, window.width, pixels, layers))
+        else {
+            return frame.memory.halves(gpu, window, &self.storage.needs(gpu, pixels, 1));
         };
         loop {
             let captured = self.capture(frame, window, room)?;
-            if known.is_none() {
-                self.guess = captured.greatest.max(1);
+            match known {
+                Some(_) => self.splits.learn(window, captured.greatest),
+                None => self.guess = captured.greatest.max(1),
             }
             if captured.is_whole {
                 self.ordered.record(frame, window, &captured.group)?;
@@ -271,7 +280,7 @@ impl Capture for ABuffer {
             }
             frame.rerenders += 1;
             room = captured.greatest;
-            if !self.fits(frame, window.width, pixels, room) {
+            if !self.storage.fits(frame, window.width, pixels, room) {
                 return self.split(frame, window, &captured.counts);
             }
         }

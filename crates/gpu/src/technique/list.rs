@@ -12,7 +12,7 @@
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};
 
-use super::growth::{KnownNeeds, STUCK, most_that_fits};
+use super::growth::{STUCK, Splits, most_that_fits};
 use super::{Capture, Layouts, Outcome};
 use crate::frame::Frame;
 use crate::memory::{Estimate, Window};
@@ -39,7 +39,7 @@ pub(crate) struct List {
     capture: SurfacePipelines,
     ordered: OrderedPasses,
     estimate: Estimate,
-    known: KnownNeeds,
+    splits: Splits,
 }
 
 impl List {
@@ -66,7 +66,7 @@ impl List {
             ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
             layout,
             estimate: Estimate::default(),
-            known: KnownNeeds::default(),
+            splits: Splits::default(),
         }
     }
 
@@ -114,7 +114,7 @@ impl List {
             |pixels, nodes| nodes < u64::from(STUCK) && frame.memory.fits(frame.gpu, &Self::needs(pixels, nodes));
         let parts =
             window.parts(&counts, fits).map_err(|nodes| frame.memory.refusal(frame.gpu, &Self::needs(1, nodes)))?;
-        self.known.learn(window, &counts, &parts, |counts| counts.iter().map(|&count| u64::from(count)).sum());
+        self.splits.split(window, &counts, &parts, |counts| counts.iter().map(|&count| u64::from(count)).sum());
         Ok(Outcome::Split(parts))
     }
 }
@@ -122,14 +122,20 @@ impl List {
 impl Capture for List {
     fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
         let (gpu, pixels) = (frame.gpu, window.pixels());
-        let known = self.known.take(window);
-        let wanted = known.unwrap_or_else(|| self.estimate.fragments(&window));
-        let Some(mut room) = most_that_fits(wanted, |nodes| frame.memory.fits(gpu, &Self::needs(pixels, nodes))) else {
+        let fits = |nodes| frame.memory.fits(gpu, &Self::needs(pixels, nodes));
+        if let Some(parts) = self.splits.parts_of(window, |a, b| a + b, fits) {
+            return Ok(Outcome::Split(parts));
+        }
+        let known = self.splits.need(window);
+        let wanted = known.map_or_else(|| self.estimate.fragments(&window), Estimate::with_slack);
+        let Some(mut room) = most_that_fits(wanted, fits) else {
             return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
         };
         loop {
             let (heads, group, nodes, is_whole) = self.capture(frame, window, room)?;
-            if known.is_none() && nodes < STUCK {
+            if known.is_some() {
+                self.splits.learn(window, nodes.into());
+            } else if nodes < STUCK {
                 self.estimate.learn(&window, nodes.into());
             }
             if is_whole {

@@ -17,7 +17,7 @@
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};
 
-use super::growth::{KnownNeeds, STUCK, most_that_fits};
+use super::growth::{STUCK, Splits, most_that_fits};
 use super::{Capture, Layouts, Outcome};
 use crate::frame::Frame;
 use crate::memory::{Estimate, Window};
@@ -49,7 +49,7 @@ pub(crate) struct Pages {
     ordered: OrderedPasses,
     /// Of fragments that pages have room for.
     estimate: Estimate,
-    known: KnownNeeds,
+    splits: Splits,
 }
 
 /// What came of a capture.
@@ -91,7 +91,7 @@ impl Pages {
             ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
             layout,
             estimate: Estimate::default(),
-            known: KnownNeeds::default(),
+            splits: Splits::default(),
         }
     }
 
@@ -134,15 +134,21 @@ impl Pages {
 impl Capture for Pages {
     fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
         let (gpu, pixels) = (frame.gpu, window.pixels());
-        let known = self.known.take(window);
-        let wanted = known.unwrap_or_else(|| self.estimate.fragments(&window).div_ceil(PAGE_SIZE));
+        if let Some(parts) = self.splits.parts_of(window, |a, b| a + b, |pages| Self::fits(frame, pixels, pages)) {
+            return Ok(Outcome::Split(parts));
+        }
+        let known = self.splits.need(window);
+        let guess = || self.estimate.fragments(&window).div_ceil(PAGE_SIZE);
+        let wanted = known.map_or_else(guess, Estimate::with_slack);
         let Some(mut room) = most_that_fits(wanted, |pages| Self::fits(frame, pixels, pages)) else {
             return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
         };
         loop {
             let Captured { heads, group, pages, is_whole } = self.capture(frame, window, room)?;
             if is_whole {
-                if known.is_none() {
+                if known.is_some() {
+                    self.splits.learn(window, pages.into());
+                } else {
                     self.estimate.learn(&window, u64::from(pages) * PAGE_SIZE);
                 }
                 self.ordered.record(frame, window, &group)?;
@@ -172,7 +178,7 @@ impl Capture for Pages {
             let parts = window
                 .parts(&full_pages, fits)
                 .map_err(|pages| frame.memory.refusal(gpu, &Self::needs(1, with_slack(pages))))?;
-            self.known.learn(window, &full_pages, &parts, |pages| with_slack(sum(pages)));
+            self.splits.split(window, &full_pages, &parts, |pages| with_slack(sum(pages)));
             return Ok(Outcome::Split(parts));
         }
     }
