@@ -156,7 +156,7 @@ pub(crate) struct VerifyArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Rendering")]
 pub(crate) struct DeviceArgs {
-    /// What renders; auto takes the CPU, and a real GPU if there is one
+    /// What renders; auto takes a real GPU if there is one, else the CPU
     #[arg(long, value_name = "NAME", default_value = "auto")]
     pub(crate) backend: Backend,
 
@@ -216,25 +216,25 @@ pub(crate) struct ViewArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Rendering")]
 pub(crate) struct CaptureArgs {
-    /// What renders; auto takes a real GPU if there is one and this build can use it, else the CPU
-    #[arg(long, value_name = "NAME", default_value = "auto")]
-    pub(crate) backend: Backend,
-
     /// How fragments are captured and ordered; see `pellucid techniques` [default: the backend's best]
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Technique::ALL.map(Technique::name)))]
     pub(crate) technique: Option<String>,
 
-    /// Threads; 0 is one for each core. The picture is the same on any number
-    #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
-    pub(crate) threads: String,
+    /// Where abuffer keeps fragments [default: buffer]
+    #[arg(long, value_name = "WHERE")]
+    pub(crate) storage: Option<StorageArg>,
 
-    /// Bytes that a GPU capture may hold, such as 512M; the CPU holds one tile a thread and needs no bound
-    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
-    pub(crate) budget: Option<String>,
+    /// Stop peel after so many layers: faster, and not exact where there are more
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) layers: Option<String>,
 
-    /// Where abuffer keeps fragments
-    #[arg(long, value_name = "WHERE", default_value = "buffer")]
-    pub(crate) storage: StorageArg,
+    /// Write all sorted fragments back before they are resolved (linear, list, pages, abuffer): pays only where they are
+    /// read more than once
+    #[arg(long)]
+    pub(crate) presort: bool,
+
+    #[command(flatten)]
+    pub(crate) device: DeviceArgs,
 }
 
 #[derive(Debug, clap::Args)]

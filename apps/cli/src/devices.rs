@@ -1,6 +1,6 @@
 //! Which techniques run here, and the renderer that runs them one after the other.
 
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer};
+use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, Storage};
 use pellucid::{Renderer, Technique};
 
 use crate::UsageError;
@@ -14,6 +14,15 @@ pub(crate) struct DevicePlan {
     backend: Backend,
     threads: usize,
     budget_bytes: Option<u64>,
+    gpu: GpuOptions,
+}
+
+/// What single techniques of the GPU can be told.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct GpuOptions {
+    pub(crate) storage: Storage,
+    pub(crate) max_layers: Option<u32>,
+    pub(crate) presort: bool,
 }
 
 /// A renderer for all of some techniques.
@@ -28,7 +37,13 @@ impl DevicePlan {
     pub(crate) fn new(args: &DeviceArgs) -> anyhow::Result<Self> {
         let threads = option("--threads", &args.threads, |text| values::whole(text, 0, MAX_THREADS))?;
         let budget_bytes = optional("--budget", args.budget.as_ref(), values::bytes)?;
-        Ok(Self { backend: args.backend, threads: threads as usize, budget_bytes })
+        let gpu = GpuOptions::default();
+        Ok(Self { backend: args.backend, threads: threads as usize, budget_bytes, gpu })
+    }
+
+    /// The same with options of single techniques.
+    pub(crate) fn with(self, gpu: GpuOptions) -> Self {
+        Self { gpu, ..self }
     }
 
     /// Checks that techniques named by an option can run on the backend.
@@ -73,7 +88,8 @@ impl DevicePlan {
                     if let Some(budget_bytes) = self.budget_bytes {
                         gpu = gpu.budget_bytes(budget_bytes);
                     }
-                    renderer = renderer.gpu(gpu);
+                    let GpuOptions { storage, max_layers, presort } = self.gpu;
+                    renderer = renderer.gpu(gpu.storage(storage).max_layers(max_layers).presort(presort));
                 }
                 Err(error @ (GpuError::NoAdapter | GpuError::OnlySoftware { .. })) if !asked_for => {
                     techniques.retain(|technique| !on_gpu(technique));

@@ -1,22 +1,22 @@
 //! What a command line means: every value checked, defaults in place, nothing left to interpret but the scene.
 
+mod capture;
 mod compare;
 mod verify;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use glam::Vec4;
 use pellucid::core::view::THICKNESS_OVER_RADIUS;
-use pellucid::gpu::Storage;
-use pellucid::{ImageFormat, Loaded, Renderer, Resolve, Scene, Shading, Technique, View};
+use pellucid::{ImageFormat, Loaded, Resolve, Scene, Shading, View};
 
 use crate::UsageError;
-use crate::args::{Backend, CaptureArgs, InfoArgs, RenderArgs, ShadingArg, StorageArg, ViewArgs};
+use crate::args::{InfoArgs, RenderArgs, ShadingArg, ViewArgs};
 use crate::camera::CameraPlan;
 use crate::values;
 
+pub(crate) use capture::{CapturePlan, Opened};
 pub(crate) use compare::{ComparePlan, Compared};
 pub(crate) use verify::VerifyPlan;
 
@@ -65,14 +65,6 @@ pub(crate) struct ViewPlan {
     shading: Shading,
     background: Vec4,
     thickness: Option<f32>,
-}
-
-/// What renders.
-#[derive(Debug)]
-pub(crate) struct CapturePlan {
-    technique: Technique,
-    threads: usize,
-    storage: Storage,
 }
 
 /// Most pictures of a turntable: four digits in their names.
@@ -180,32 +172,6 @@ impl ViewPlan {
     }
 }
 
-impl CapturePlan {
-    fn new(args: &CaptureArgs) -> anyhow::Result<Self> {
-        let threads = option("--threads", &args.threads, |text| values::whole(text, 0, MAX_THREADS))?;
-        // The CPU holds one tile a thread, whatever the bound; what is no amount is still said to be none.
-        optional("--budget", args.budget.as_ref(), values::bytes)?;
-        let technique = match &args.technique {
-            Some(name) => name.parse().map_err(|error| usage(format!("{error}")))?,
-            None => Technique::Cpu,
-        };
-        if args.backend == Backend::Gpu {
-            bail!(
-                "this build has no GPU techniques yet; leave out --backend gpu to render on the CPU, exactly as well"
-            );
-        }
-        let storage = match args.storage {
-            StorageArg::Buffer => Storage::Buffer,
-            StorageArg::Texture => Storage::Texture,
-        };
-        Ok(Self { technique, threads: threads as usize, storage })
-    }
-
-    pub(crate) fn renderer(&self) -> Renderer {
-        Renderer::new().technique(self.technique).threads(self.threads).storage(self.storage)
-    }
-}
-
 fn usage(message: String) -> anyhow::Error {
     UsageError(message).into()
 }
@@ -245,7 +211,6 @@ mod tests {
         let library = View::of(&scene);
         assert_eq!(View { background: library.background, ..view }, library);
         assert_eq!((plan.resolve, plan.frames, plan.stats, plan.quiet), (Resolve::Blend, None, None, false));
-        assert_eq!((plan.capture.technique, plan.capture.threads), (Technique::Cpu, 0));
     }
 
     #[test]
@@ -261,7 +226,7 @@ mod tests {
         assert_eq!((view.shading, view.background), (Shading::Unlit, Vec4::ZERO));
         assert_eq!(view.camera.eye, glam::Vec3::new(-1.0, 2.0, 3.0));
         assert_eq!((plan.resolve, plan.frames, plan.stats), (Resolve::Layer(2), Some(8), Some(StatsTarget::Stdout)));
-        assert_eq!((plan.capture.technique, plan.capture.threads, plan.quiet), (Technique::Oracle, 3, true));
+        assert!(plan.quiet);
     }
 
     #[test]
@@ -281,6 +246,12 @@ mod tests {
             "-o a.png --frames 0",
             "-o a.png --thickness 0",
             "-o a.png --background bleu",
+            "-o a.png --layers 0",
+            "-o a.png --layers 4 --technique linear",
+            "-o a.png --storage texture --technique list",
+            "-o a.png --presort --technique peel",
+            "-o a.png --technique linear --backend cpu",
+            "-o a.png --technique oracle --backend gpu",
         ] {
             let error = render(line).unwrap_err();
             assert!(error.is::<UsageError>(), "{line}");
@@ -290,7 +261,6 @@ mod tests {
         for line in ["-o a.jpg", "-o a", "-o a.png --resolve sum", "-o a.png --stats a.png"] {
             assert!(render(line).unwrap_err().is::<UsageError>(), "{line}");
         }
-        assert!(!render("-o a.png --backend gpu").unwrap_err().is::<UsageError>());
     }
 
     #[test]

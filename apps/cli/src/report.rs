@@ -38,6 +38,7 @@ pub(crate) struct Figures {
     peak_bytes: u64,
     windows: u32,
     rerenders: u32,
+    cut_pixels: u64,
 }
 
 /// A timed part of a frame.
@@ -87,7 +88,7 @@ impl Run {
             resolve,
             backend: technique.backend(),
             technique: technique.name(),
-            exact: technique.is_exact(),
+            exact: stats.is_exact(),
             device: stats.device.clone(),
             width: stats.width,
             height: stats.height,
@@ -108,6 +109,7 @@ impl From<&Stats> for Figures {
             peak_bytes: stats.peak_bytes,
             windows: stats.windows,
             rerenders: stats.rerenders,
+            cut_pixels: stats.cut_pixels,
         }
     }
 }

@@ -69,7 +69,6 @@ fn failures_are_one_line_and_leave_nothing_behind() {
         ("render @boxes:n=2 -o broken.glb/a.png", "not a folder"),
         ("render @boxes:n=2 -o a.png --stats nowhere/s.json", "no folder 'nowhere'"),
         ("render @boxes:n=2 -o nowhere/a.png --frames 2", "no folder 'nowhere'"),
-        ("render @boxes:n=2 -o a.png --backend gpu", "no GPU techniques yet"),
         ("info missing.obj", "missing.obj"),
     ] {
         let outcome = work.run(line);

@@ -83,6 +83,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) rerenders: u32,
     /// Layers after which peeling stops.
     pub(crate) max_layers: Option<u32>,
+    /// Whether all sorted fragments are written back.
+    pub(crate) presort: bool,
     /// Pixels that had more.
     pub(crate) cut_pixels: u64,
     frame_data: wgpu::Buffer,
@@ -118,6 +120,7 @@ impl<'a> Frame<'a> {
             goal,
             rerenders: 0,
             max_layers: None,
+            presort: false,
             cut_pixels: 0,
             frame_data,
             encoder: None,
@@ -127,9 +130,14 @@ impl<'a> Frame<'a> {
     /// Aims everything recorded from now on at a window. Submits what was recorded for another.
     pub(crate) fn set_window(&mut self, window: Window) -> Result<(), GpuError> {
         self.submit()?;
-        let data = FrameData::new(self.view, self.resolve, window);
+        let data = FrameData::new(self.view, self.resolve, window, self.viewport());
         self.gpu.queue.write_buffer(&self.frame_data, 0, bytemuck::bytes_of(&data));
         Ok(())
+    }
+
+    /// Width and height of the hardware's viewport in pixels.
+    fn viewport(&self) -> f32 {
+        self.gpu.limits.max_texture_dimension_2d as f32
     }
 
     /// What commands go to.
@@ -191,6 +199,11 @@ impl<'a> Frame<'a> {
             multiview_mask: None,
         };
         let mut pass = self.encoder().begin_render_pass(&descriptor).forget_lifetime();
+        // As large as can be around the picture, so that no triangle has to be clipped at its sides: llvmpipe does that, and
+        // the new corners it snaps to the grid move the edges between them.
+        let side = self.viewport();
+        let start = |pixels: u32| (pixels as f32 - side) / 2.0;
+        pass.set_viewport(start(self.view.width), start(self.view.height), side, side, 0.0, 1.0);
         pass.set_scissor_rect(window.left, window.top, window.width, window.height);
         Ok(pass)
     }

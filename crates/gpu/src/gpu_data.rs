@@ -33,12 +33,14 @@ pub struct FrameData {
     pub thickness_unit: f32,
     /// Of the resolve `layer:N`.
     pub layer: u32,
+    /// Pixels of half the hardware's viewport, see `Frame::render_pass_into`.
+    pub half_viewport: f32,
     /// Ends on a multiple of 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 impl FrameData {
-    pub(crate) fn new(view: &View, resolve: Resolve, window: Window) -> Self {
+    pub(crate) fn new(view: &View, resolve: Resolve, window: Window, viewport: f32) -> Self {
         let (near, far, is_perspective) = match view.camera.projection {
             Projection::Perspective { near, .. } => (near, 0.0, 1),
             Projection::Orthographic { near, far, .. } => (near, far, 0),
@@ -54,7 +56,8 @@ impl FrameData {
             is_perspective,
             thickness_unit: view.thickness_unit,
             layer: if let Resolve::Layer(number) = resolve { number } else { 0 },
-            padding: [0; 3],
+            half_viewport: viewport / 2.0,
+            padding: [0; 2],
         }
     }
 }
@@ -113,6 +116,8 @@ pub mod flags {
     pub const HAS_COLORS: u32 = 32;
     /// Has a texture.
     pub const HAS_TEXTURE: u32 = 64;
+    /// Triangles share corners, and are drawn by index.
+    pub const SHARES_CORNERS: u32 = 128;
 }
 
 /// Where a mesh's data lie in the buffers of its scene.
@@ -126,7 +131,7 @@ pub(crate) struct MeshPlaces {
 }
 
 impl DrawData {
-    pub(crate) fn new(draw: &Draw<'_>, places: &MeshPlaces, may_overflow: bool) -> Self {
+    pub(crate) fn new(draw: &Draw<'_>, places: &MeshPlaces, may_overflow: bool, shares_corners: bool) -> Self {
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let flags = bit(draw.lit, flags::LIT)
             | bit(draw.mesh.normals().is_some(), flags::HAS_NORMALS)
@@ -134,7 +139,8 @@ impl DrawData {
             | bit(draw.blends, flags::BLENDS)
             | bit(draw.cutoff.is_some(), flags::HAS_CUTOFF)
             | bit(draw.mesh.colors().is_some(), flags::HAS_COLORS)
-            | bit(draw.texture.is_some(), flags::HAS_TEXTURE);
+            | bit(draw.texture.is_some(), flags::HAS_TEXTURE)
+            | bit(shares_corners, flags::SHARES_CORNERS);
         let normal = draw.view_from_normal;
         let (transform, sampling) = draw
             .texture

@@ -30,6 +30,7 @@ pub struct GpuRenderer {
     picture_layout: BindGroupLayout,
     budget_bytes: u64,
     max_layers: Option<u32>,
+    presort: bool,
     storage: Storage,
     kept: Mutex<Kept>,
 }
@@ -79,6 +80,7 @@ impl GpuRenderer {
             picture_layout,
             budget_bytes: DEFAULT_BUDGET_BYTES,
             max_layers: None,
+            presort: false,
             storage: Storage::default(),
             kept: Mutex::new(kept),
         })
@@ -96,6 +98,14 @@ impl GpuRenderer {
     #[must_use]
     pub fn max_layers(mut self, max_layers: Option<u32>) -> Self {
         self.max_layers = max_layers;
+        self
+    }
+
+    /// The same renderer, writing all sorted fragments of an LFB back before it resolves them: for resolves that read them
+    /// more than once. Otherwise pixels with few fragments are sorted on the way to the resolve. The picture is the same.
+    #[must_use]
+    pub fn presort(mut self, presort: bool) -> Self {
+        self.presort = presort;
         self
     }
 
@@ -211,6 +221,7 @@ impl GpuRenderer {
         let mut frame =
             Frame::new(FrameParts { gpu, view, resolve, surfaces, targets, memory, picture, goal, frame_data });
         frame.max_layers = self.max_layers;
+        frame.presort = self.presort;
 
         let whole = Window { left: 0, top: 0, width: view.width, height: view.height };
         frame.set_window(whole)?;

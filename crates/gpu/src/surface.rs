@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use pellucid_core::primitive::{Draw, Pass, draws};
 use pellucid_core::{Scene, View};
+use wgpu::util::RenderEncoder;
 use wgpu::{BindGroup, BindGroupLayout, BindingType, BufferBindingType, ShaderStages};
 
 use crate::gpu_data::{DrawData, FrameData};
@@ -34,11 +35,20 @@ enum Cull {
     BackMirrored,
 }
 
+/// What is drawn of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Corners {
+    /// So many, those of each triangle one after the other.
+    Apart(u32),
+    /// By index: first, and one behind the last.
+    Shared(u32, u32),
+}
+
 /// One instance, ready to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceDraw {
     pass: Pass,
-    corners: u32,
+    corners: Corners,
     cull: Cull,
     varies: bool,
     has_cutoff: bool,
@@ -83,7 +93,7 @@ struct DrawCommand<'a> {
     pipeline: &'a wgpu::RenderPipeline,
     frame_group: &'a BindGroup,
     texture: &'a BindGroup,
-    corners: u32,
+    corners: Corners,
 }
 
 /// What a pass does with surfaces.
@@ -147,7 +157,7 @@ impl SurfaceLayouts {
             "frame and draw",
             &[uniform(0), storage_entry(1, both, true), texture(2, wgpu::TextureSampleType::Depth)],
         );
-        let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, both, true)));
+        let scene = layout("scene", &[0, 1, 2, 3].map(|binding| storage_entry(binding, ShaderStages::VERTEX, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
         let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
         let one_texel = |format| {
@@ -234,11 +244,17 @@ impl<'a> Surfaces<'a> {
                 if may_overflow {
                     dropped_triangles += count_dropped(draw);
                 }
-                let data = DrawData::new(draw, &mesh.places, may_overflow);
+                let corners = draw.mesh.triangles().len() as u32 * 3;
+                // A triangle is dropped whole, so that it may share no corner.
+                let corners = match mesh.first_shared {
+                    Some(first) if !may_overflow => Corners::Shared(first, first + corners),
+                    _ => Corners::Apart(corners),
+                };
+                let data = DrawData::new(draw, &mesh.places, may_overflow, matches!(corners, Corners::Shared(..)));
                 bytes[..size_of::<DrawData>()].copy_from_slice(bytemuck::bytes_of(&data));
                 SurfaceDraw {
                     pass: draw.pass,
-                    corners: draw.mesh.triangles().len() as u32 * 3,
+                    corners,
                     cull: match (draw.culls_back_faces, draw.mirrored) {
                         (false, _) => Cull::None,
                         (true, false) => Cull::Back,
@@ -269,37 +285,25 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Records all draws of a part of the frame, in draw order. Group 3 must be set if the pipelines have one.
-    pub(crate) fn draw(
-        &self,
-        gpu: &Context,
-        recording: &mut wgpu::RenderPass<'_>,
-        pass: Pass,
-        pipelines: &mut SurfacePipelines,
-    ) {
-        recording.set_bind_group(1, &self.scene.bind_group, &[]);
-        self.for_each_draw(gpu, pass, pipelines, |draw| {
-            recording.set_pipeline(draw.pipeline);
-            recording.set_bind_group(0, draw.frame_group, &[]);
-            recording.set_bind_group(2, draw.texture, &[]);
-            recording.draw(0..draw.corners, 0..1);
-        });
-    }
-
-    /// As [`Self::draw`], once for many passes: into a bundle.
-    pub(crate) fn record<'r>(
+    /// Records all draws of a part of the frame, in draw order, into a pass or a bundle. Group 3 must be set if the
+    /// pipelines have one.
+    pub(crate) fn draw<'r>(
         &'r self,
         gpu: &Context,
-        recording: &mut wgpu::RenderBundleEncoder<'r>,
+        recording: &mut impl RenderEncoder<'r>,
         pass: Pass,
         pipelines: &'r mut SurfacePipelines,
     ) {
-        recording.set_bind_group(1, &self.scene.bind_group, &[]);
+        recording.set_bind_group(1, Some(&self.scene.bind_group), &[]);
+        recording.set_index_buffer(self.scene.order.slice(..), wgpu::IndexFormat::Uint32);
         self.for_each_draw(gpu, pass, pipelines, |draw| {
             recording.set_pipeline(draw.pipeline);
-            recording.set_bind_group(0, draw.frame_group, &[]);
-            recording.set_bind_group(2, draw.texture, &[]);
-            recording.draw(0..draw.corners, 0..1);
+            recording.set_bind_group(0, Some(draw.frame_group), &[]);
+            recording.set_bind_group(2, Some(draw.texture), &[]);
+            match draw.corners {
+                Corners::Apart(count) => recording.draw(0..count, 0..1),
+                Corners::Shared(first, end) => recording.draw_indexed(first..end, 0, 0..1),
+            }
         });
     }
 

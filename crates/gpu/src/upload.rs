@@ -1,11 +1,14 @@
-//! A scene on the GPU: all meshes in three storage buffers, textures with the mip levels of the core. Kept while the
-//! scene's revision stays the same.
+//! A scene on the GPU: all meshes in four storage buffers and an index buffer, textures with the mip levels of the core.
+//! Kept while the scene's revision stays the same.
+
+mod provoking;
 
 use glam::Vec3;
 use pellucid_core::texture::MipLevel;
 use pellucid_core::{Scene, Texture};
 use wgpu::{BindGroup, BufferUsages, TextureUsages};
 
+use self::provoking::SharedCorners;
 use crate::gpu_data::MeshPlaces;
 use crate::surface::SurfaceLayouts;
 use crate::{Context, GpuError};
@@ -16,6 +19,8 @@ pub(crate) struct MeshUpload {
     pub(crate) places: MeshPlaces,
     /// Greatest coordinate of a vertex that is used, on each axis; NaN or infinite if there is such a vertex.
     pub(crate) reach: Vec3,
+    /// Place of its first index in [`SceneUpload::order`], if triangles share corners.
+    pub(crate) first_shared: Option<u32>,
 }
 
 /// A scene on the GPU.
@@ -24,6 +29,8 @@ pub(crate) struct SceneUpload {
     pub(crate) revision: u64,
     pub(crate) meshes: Vec<MeshUpload>,
     pub(crate) bind_group: BindGroup,
+    /// The index buffer.
+    pub(crate) order: wgpu::Buffer,
     pub(crate) textures: Vec<BindGroup>,
 }
 
@@ -32,6 +39,8 @@ impl SceneUpload {
         let mut positions: Vec<f32> = Vec::new();
         let mut attributes: Vec<f32> = Vec::new();
         let mut indices: Vec<u32> = Vec::new();
+        let mut shared_corners: Vec<[u32; 2]> = Vec::new();
+        let mut order: Vec<u32> = Vec::new();
         let mut meshes = Vec::with_capacity(scene.meshes().len());
         for mesh in scene.meshes() {
             let mut places = MeshPlaces {
@@ -47,14 +56,28 @@ impl SceneUpload {
             attributes.extend_from_slice(bytemuck::cast_slice(mesh.colors().unwrap_or_default()));
             positions.extend_from_slice(bytemuck::cast_slice(mesh.positions()));
             indices.extend(mesh.triangles().as_flattened().iter().map(|&vertex| places.first_vertex + vertex));
-            meshes.push(MeshUpload { places, reach: reach(mesh) });
+            let mut first_shared = None;
+            // Without normals, every triangle has its own.
+            if mesh.normals().is_some() {
+                let shared = SharedCorners::of(mesh.triangles(), mesh.positions().len());
+                if shared.pays() {
+                    first_shared = Some(place(&order)?);
+                    let first_corner = place(shared_corners.as_flattened())? / 2;
+                    order.extend(shared.order.as_flattened().iter().map(|&corner| first_corner + corner));
+                    let first_vertex = places.first_vertex;
+                    shared_corners.extend(shared.corners.iter().map(|&[vertex, of]| [first_vertex + vertex, of]));
+                }
+            }
+            meshes.push(MeshUpload { places, reach: reach(mesh), first_shared });
         }
         let buffers = [
-            storage(gpu, "the scene's positions", bytemuck::cast_slice(&positions))?,
-            storage(gpu, "the scene's attributes", bytemuck::cast_slice(&attributes))?,
-            storage(gpu, "the scene's indices", bytemuck::cast_slice(&indices))?,
+            upload(gpu, "the scene's positions", &positions, BufferUsages::STORAGE)?,
+            upload(gpu, "the scene's attributes", &attributes, BufferUsages::STORAGE)?,
+            upload(gpu, "the scene's indices", &indices, BufferUsages::STORAGE)?,
+            upload(gpu, "the scene's corners", shared_corners.as_flattened(), BufferUsages::STORAGE)?,
         ];
-        let entries = [0, 1, 2]
+        let order = upload(gpu, "the scene's order of corners", &order, BufferUsages::INDEX)?;
+        let entries = [0, 1, 2, 3]
             .map(|binding| wgpu::BindGroupEntry { binding, resource: buffers[binding as usize].as_entire_binding() });
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
@@ -67,7 +90,7 @@ impl SceneUpload {
             .map(|texture| Ok(layouts.texture_bind_group(gpu, &upload_texture(gpu, texture)?)))
             .collect::<Result<_, GpuError>>()?;
         gpu.check()?;
-        Ok(Self { revision: scene.revision(), meshes, bind_group, textures })
+        Ok(Self { revision: scene.revision(), meshes, bind_group, order, textures })
     }
 }
 
@@ -89,10 +112,16 @@ fn place<T>(so_far: &[T]) -> Result<u32, GpuError> {
     })
 }
 
-fn storage(gpu: &Context, label: &str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+fn upload<T: bytemuck::Pod>(
+    gpu: &Context,
+    label: &str,
+    data: &[T],
+    usage: BufferUsages,
+) -> Result<wgpu::Buffer, GpuError> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
     // Bindings may not be empty.
     let size = (bytes.len() as u64).max(16);
-    let buffer = gpu.buffer(label, size, BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::INDEX)?;
+    let buffer = gpu.buffer(label, size, usage | BufferUsages::COPY_DST)?;
     gpu.queue.write_buffer(&buffer, 0, bytes);
     Ok(buffer)
 }

@@ -66,7 +66,7 @@ pub(crate) fn run(plan: &InfoPlan) -> anyhow::Result<()> {
     let loaded = plan.scene.load()?;
     let view = plan.view.of(&loaded.scene)?;
     progress.stage("counting layers");
-    let stats = plan.capture.renderer().layers(&loaded.scene, &view, |_| ())?;
+    let stats = plan.capture.open()?.renderer.layers(&loaded.scene, &view, |_| ())?;
     drop(progress);
 
     if !plan.quiet {

@@ -20,6 +20,13 @@ fn warn_about(warnings: &[String]) {
 }
 
 /// Says which triangles a renderer left out.
+fn warn_about_cut(stats: &Stats) {
+    if stats.cut_pixels > 0 {
+        let pixels = plural(stats.cut_pixels, "pixel");
+        terminal::warn(&format!("not exact: {pixels} with more layers than --layers allows"));
+    }
+}
+
 fn warn_about_dropped(stats: &Stats) {
     if stats.dropped_triangles > 0 {
         let triangles = plural(stats.dropped_triangles, "triangle");

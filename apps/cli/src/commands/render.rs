@@ -6,8 +6,8 @@ use anyhow::Context;
 use pellucid::core::heat_map;
 use pellucid::{Camera, Frame, Renderer, Resolve, Scene, Stats, View, files};
 
-use crate::commands::{warn_about, warn_about_dropped};
-use crate::plan::{RenderPlan, StatsTarget};
+use crate::commands::{warn_about, warn_about_cut, warn_about_dropped};
+use crate::plan::{Opened, RenderPlan, StatsTarget};
 use crate::progress::Progress;
 use crate::report::{self, Figures, Run};
 use crate::words::{duration, plural, short_count};
@@ -30,7 +30,8 @@ pub(crate) fn run(plan: &RenderPlan) -> anyhow::Result<()> {
     if !plan.quiet {
         progress.suspend(|| warn_about(&loaded.warnings));
     }
-    let job = Job { plan, scene: &loaded.scene, renderer: plan.capture.renderer(), progress: &progress };
+    let Opened { renderer, misses_gpu } = plan.capture.open()?;
+    let job = Job { plan, scene: &loaded.scene, renderer, misses_gpu, progress: &progress };
     match plan.frames {
         None => job.picture(&view),
         Some(count) => job.turntable(&view, count),
@@ -42,6 +43,7 @@ struct Job<'a> {
     plan: &'a RenderPlan,
     scene: &'a Scene,
     renderer: Renderer,
+    misses_gpu: bool,
     progress: &'a Progress,
 }
 
@@ -54,7 +56,8 @@ impl Job<'_> {
         }
         self.say(|| {
             warn_about_dropped(&stats);
-            terminal::note(&summary(&self.plan.output, &stats));
+            warn_about_cut(&stats);
+            terminal::note(&summary(&self.plan.output, &stats, self.misses_gpu));
         });
         Ok(())
     }
@@ -83,6 +86,7 @@ impl Job<'_> {
         }
         self.say(|| {
             warn_about_dropped(&stats);
+            warn_about_cut(&stats);
             let Stats { width, height, .. } = &stats;
             let mean = duration(total_ms / f64::from(count));
             let last = numbered(&self.plan.output, count);
@@ -90,7 +94,7 @@ impl Job<'_> {
             terminal::note(&format!(
                 "{first} to {}: {pictures}, {width} x {height}, {mean} each ({})",
                 last.display(),
-                rendered_by(&stats)
+                rendered_by(&stats, self.misses_gpu)
             ));
         });
         Ok(())
@@ -137,21 +141,21 @@ fn words(full_scale: u32) -> String {
 }
 
 /// `gallery.png: 1280 x 720, 1.2 M fragments, at most 23 behind a pixel, 35 ms (cpu, 2 threads)`
-fn summary(path: &Path, stats: &Stats) -> String {
+fn summary(path: &Path, stats: &Stats, misses_gpu: bool) -> String {
     let Stats { width, height, .. } = stats;
     let layers = match stats.fragments {
         0 => "no transparent fragments".to_owned(),
         count => format!("{} fragments, at most {} behind a pixel", short_count(count), stats.max_depth_complexity),
     };
     let took = duration(stats.total_ms);
-    format!("{}: {width} x {height}, {layers}, {took} ({})", path.display(), rendered_by(stats))
+    format!("{}: {width} x {height}, {layers}, {took} ({})", path.display(), rendered_by(stats, misses_gpu))
 }
 
-/// `cpu, 2 threads`
-fn rendered_by(stats: &Stats) -> String {
+/// `cpu, 2 threads; no GPU found`
+fn rendered_by(stats: &Stats, misses_gpu: bool) -> String {
     // That the technique runs on the CPU is in its name already.
     let device = stats.device.strip_prefix("CPU, ").unwrap_or(&stats.device);
-    format!("{}, {device}", stats.technique)
+    format!("{}, {device}{}", stats.technique, if misses_gpu { "; no GPU found" } else { "" })
 }
 
 /// `out.png` as `out-0001.png`.

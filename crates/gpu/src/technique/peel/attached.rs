@@ -224,6 +224,6 @@ fn record(frame: &Frame<'_>, pipelines: &mut SurfacePipelines, group: Option<&wg
     if let Some(group) = group {
         encoder.set_bind_group(3, group, &[]);
     }
-    frame.surfaces.record(frame.gpu, &mut encoder, Pass::Transparent, pipelines);
+    frame.surfaces.draw(frame.gpu, &mut encoder, Pass::Transparent, pipelines);
     encoder.finish(&wgpu::RenderBundleDescriptor { label: Some("peel") })
 }

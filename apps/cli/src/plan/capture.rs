@@ -1,0 +1,62 @@
+//! With what a picture is rendered.
+
+use pellucid::gpu::Storage;
+use pellucid::{Renderer, Technique};
+
+use super::{optional, usage};
+use crate::args::{CaptureArgs, StorageArg};
+use crate::devices::{DevicePlan, GpuOptions};
+use crate::values;
+
+/// What renders.
+#[derive(Debug)]
+pub(crate) struct CapturePlan {
+    /// The one named; `None` for the best of the backend.
+    technique: Option<Technique>,
+    device: DevicePlan,
+}
+
+/// A renderer, ready.
+pub(crate) struct Opened {
+    pub(crate) renderer: Renderer,
+    /// Whether a GPU would have been taken, had there been one.
+    pub(crate) misses_gpu: bool,
+}
+
+/// Techniques taken where none is named, the best last.
+const BEST: [Technique; 2] = [Technique::Cpu, Technique::Linear];
+
+impl CapturePlan {
+    pub(super) fn new(args: &CaptureArgs) -> anyhow::Result<Self> {
+        let technique = args.technique.as_ref().map(|name| name.parse().map_err(|error| usage(format!("{error}"))));
+        let technique: Option<Technique> = technique.transpose()?;
+        let max_layers = optional("--layers", args.layers.as_ref(), |text| values::whole(text, 1, u32::MAX))?;
+        let lists = [Technique::Linear, Technique::List, Technique::ABuffer, Technique::Pages];
+        only_for("--layers", max_layers.is_some(), technique, &[Technique::Peel])?;
+        only_for("--storage", args.storage.is_some(), technique, &[Technique::ABuffer])?;
+        only_for("--presort", args.presort, technique, &lists)?;
+        let storage = match args.storage {
+            None | Some(StorageArg::Buffer) => Storage::Buffer,
+            Some(StorageArg::Texture) => Storage::Texture,
+        };
+        let device = DevicePlan::new(&args.device)?.with(GpuOptions { storage, max_layers, presort: args.presort });
+        device.check("--technique", technique.as_slice())?;
+        Ok(Self { technique, device })
+    }
+
+    /// Opens what is needed.
+    pub(crate) fn open(&self) -> anyhow::Result<Opened> {
+        let devices = self.device.open(self.technique.as_slice(), |technique| BEST.contains(&technique))?;
+        let technique = devices.techniques.last().copied().unwrap_or(Technique::Cpu);
+        Ok(Opened { renderer: devices.renderer.technique(technique), misses_gpu: devices.without_gpu.is_some() })
+    }
+}
+
+/// An option that some techniques alone understand.
+fn only_for(name: &str, is_given: bool, technique: Option<Technique>, those: &[Technique]) -> anyhow::Result<()> {
+    if is_given && !technique.is_some_and(|technique| those.contains(&technique)) {
+        let those: Vec<_> = those.iter().map(|technique| format!("`--technique {technique}`")).collect();
+        return Err(usage(format!("{name} goes with {}", those.join(" or "))));
+    }
+    Ok(())
+}
