@@ -106,8 +106,6 @@ pub mod flags {
     pub const LIT: u32 = 1;
     /// Has a normal at each vertex.
     pub const HAS_NORMALS: u32 = 2;
-    /// Clip coordinates may not be finite, so that every triangle has to be tested.
-    pub const MAY_OVERFLOW: u32 = 4;
     /// Base colour has a say in alpha.
     pub const BLENDS: u32 = 8;
     /// Has to pass an alpha test.
@@ -116,8 +114,6 @@ pub mod flags {
     pub const HAS_COLORS: u32 = 32;
     /// Has a texture.
     pub const HAS_TEXTURE: u32 = 64;
-    /// Triangles share corners, and are drawn by index.
-    pub const SHARES_CORNERS: u32 = 128;
 }
 
 /// Where a mesh's data lie in the buffers of its scene.
@@ -131,16 +127,14 @@ pub(crate) struct MeshPlaces {
 }
 
 impl DrawData {
-    pub(crate) fn new(draw: &Draw<'_>, places: &MeshPlaces, may_overflow: bool, shares_corners: bool) -> Self {
+    pub(crate) fn new(draw: &Draw<'_>, places: &MeshPlaces) -> Self {
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let flags = bit(draw.lit, flags::LIT)
             | bit(draw.mesh.normals().is_some(), flags::HAS_NORMALS)
-            | bit(may_overflow, flags::MAY_OVERFLOW)
             | bit(draw.blends, flags::BLENDS)
             | bit(draw.cutoff.is_some(), flags::HAS_CUTOFF)
             | bit(draw.mesh.colors().is_some(), flags::HAS_COLORS)
-            | bit(draw.texture.is_some(), flags::HAS_TEXTURE)
-            | bit(shares_corners, flags::SHARES_CORNERS);
+            | bit(draw.texture.is_some(), flags::HAS_TEXTURE);
         let normal = draw.view_from_normal;
         let (transform, sampling) = draw
             .texture

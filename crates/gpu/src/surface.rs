@@ -12,6 +12,7 @@ use wgpu::{BindGroup, BindGroupLayout, BindingType, BufferBindingType, ShaderSta
 
 use crate::gpu_data::{DrawData, FrameData};
 use crate::upload::SceneUpload;
+use crate::upload::corners::Corner;
 use crate::{Context, GpuError, shaders};
 
 /// Long-lived: layouts, the vertex shader, and what stands in for a texture where there is none.
@@ -35,20 +36,22 @@ enum Cull {
     BackMirrored,
 }
 
-/// What is drawn of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Corners {
-    /// So many, those of each triangle one after the other.
-    Apart(u32),
-    /// By index: first, and one behind the last.
-    Shared(u32, u32),
+/// What draws have to have in common to be drawn by one pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct PipelineKey {
+    cull: Cull,
+    varied: bool,
+    is_apart: bool,
 }
 
 /// One instance, ready to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceDraw {
     pass: Pass,
-    corners: Corners,
+    corners: u32,
+    /// Triangles share no corner, as one that is not finite drops the whole triangle.
+    is_apart: bool,
+    mesh: usize,
     cull: Cull,
     varies: bool,
     has_cutoff: bool,
@@ -93,7 +96,9 @@ struct DrawCommand<'a> {
     pipeline: &'a wgpu::RenderPipeline,
     frame_group: &'a BindGroup,
     texture: &'a BindGroup,
-    corners: Corners,
+    corners: u32,
+    /// Vertex and index buffer; none where triangles share nothing.
+    shared: Option<(&'a wgpu::Buffer, &'a wgpu::Buffer)>,
 }
 
 /// What a pass does with surfaces.
@@ -125,7 +130,7 @@ pub(crate) struct SurfacePipelines {
     depth_stencil: wgpu::DepthStencilState,
     layout: wgpu::PipelineLayout,
     fragment: wgpu::ShaderModule,
-    pipelines: HashMap<(Cull, bool), wgpu::RenderPipeline>,
+    pipelines: HashMap<PipelineKey, wgpu::RenderPipeline>,
 }
 
 impl SurfaceLayouts {
@@ -155,9 +160,9 @@ impl SurfaceLayouts {
         };
         let frame = layout(
             "frame and draw",
-            &[uniform(0), storage_entry(1, both, true), texture(2, wgpu::TextureSampleType::Depth)],
+            &[uniform(0), uniform(1), texture(2, wgpu::TextureSampleType::Depth), storage_entry(3, both, true)],
         );
-        let scene = layout("scene", &[0, 1, 2, 3].map(|binding| storage_entry(binding, ShaderStages::VERTEX, true)));
+        let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, ShaderStages::VERTEX, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
         let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
         let one_texel = |format| {
@@ -244,17 +249,13 @@ impl<'a> Surfaces<'a> {
                 if may_overflow {
                     dropped_triangles += count_dropped(draw);
                 }
-                let corners = draw.mesh.triangles().len() as u32 * 3;
-                // A triangle is dropped whole, so that it may share no corner.
-                let corners = match mesh.first_shared {
-                    Some(first) if !may_overflow => Corners::Shared(first, first + corners),
-                    _ => Corners::Apart(corners),
-                };
-                let data = DrawData::new(draw, &mesh.places, may_overflow, matches!(corners, Corners::Shared(..)));
+                let data = DrawData::new(draw, &mesh.places);
                 bytes[..size_of::<DrawData>()].copy_from_slice(bytemuck::bytes_of(&data));
                 SurfaceDraw {
                     pass: draw.pass,
-                    corners,
+                    corners: draw.mesh.triangles().len() as u32 * 3,
+                    is_apart: may_overflow,
+                    mesh: instance.mesh.index(),
                     cull: match (draw.culls_back_faces, draw.mirrored) {
                         (false, _) => Cull::None,
                         (true, false) => Cull::Back,
@@ -295,14 +296,17 @@ impl<'a> Surfaces<'a> {
         pipelines: &'r mut SurfacePipelines,
     ) {
         recording.set_bind_group(1, Some(&self.scene.bind_group), &[]);
-        recording.set_index_buffer(self.scene.order.slice(..), wgpu::IndexFormat::Uint32);
         self.for_each_draw(gpu, pass, pipelines, |draw| {
             recording.set_pipeline(draw.pipeline);
             recording.set_bind_group(0, Some(draw.frame_group), &[]);
             recording.set_bind_group(2, Some(draw.texture), &[]);
-            match draw.corners {
-                Corners::Apart(count) => recording.draw(0..count, 0..1),
-                Corners::Shared(first, end) => recording.draw_indexed(first..end, 0, 0..1),
+            match draw.shared {
+                None => recording.draw(0..draw.corners, 0..1),
+                Some((corners, order)) => {
+                    recording.set_vertex_buffer(0, Some(corners.slice(..)));
+                    recording.set_index_buffer(order.slice(..), wgpu::IndexFormat::Uint32);
+                    recording.draw_indexed(0..draw.corners, 0, 0..1);
+                }
             }
         });
     }
@@ -316,7 +320,10 @@ impl<'a> Surfaces<'a> {
     ) {
         let draws = || self.draws.iter().filter(|draw| draw.pass == pass);
         let ignores_color = pipelines.ignores_color;
-        let key = |draw: &SurfaceDraw| (draw.cull, if ignores_color { draw.has_cutoff } else { draw.varies });
+        let key = |draw: &SurfaceDraw| {
+            let varied = if ignores_color { draw.has_cutoff } else { draw.varies };
+            PipelineKey { cull: draw.cull, varied, is_apart: draw.is_apart }
+        };
         draws().for_each(|draw| pipelines.make(gpu, self.layouts, key(draw)));
         let pipelines = &pipelines.pipelines;
         let commands = draws().map(|draw| DrawCommand {
@@ -327,6 +334,10 @@ impl<'a> Surfaces<'a> {
             },
             texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
             corners: draw.corners,
+            shared: (!draw.is_apart).then(|| {
+                let mesh = &self.scene.meshes[draw.mesh];
+                (&mesh.corners, &mesh.order)
+            }),
         });
         commands.for_each(visit);
     }
@@ -334,7 +345,9 @@ impl<'a> Surfaces<'a> {
 
 /// Bytes from the data of one draw to the next.
 fn draw_stride(gpu: &Context) -> usize {
-    size_of::<DrawData>().next_multiple_of(gpu.limits.min_storage_buffer_offset_alignment as usize)
+    let limits = &gpu.limits;
+    let alignment = limits.min_storage_buffer_offset_alignment.max(limits.min_uniform_buffer_offset_alignment);
+    size_of::<DrawData>().next_multiple_of(alignment as usize)
 }
 
 impl DrawGroups {
@@ -363,7 +376,7 @@ impl DrawGroups {
         let (uniform, storage) = (wgpu::BufferUsages::UNIFORM, wgpu::BufferUsages::STORAGE);
         let copied = wgpu::BufferUsages::COPY_DST;
         let frame_data = gpu.buffer("the frame", size_of::<FrameData>() as u64, uniform | copied)?;
-        let instances = gpu.buffer("the instances", bytes, storage | copied)?;
+        let instances = gpu.buffer("the instances", bytes, uniform | storage | copied)?;
         let draw_data = |offset| {
             wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                 buffer: &instances,
@@ -379,6 +392,7 @@ impl DrawGroups {
                     wgpu::BindGroupEntry { binding: 0, resource: frame_data.as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 1, resource: draw_data(offset) },
                     wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(depth) },
+                    wgpu::BindGroupEntry { binding: 3, resource: draw_data(offset) },
                 ],
             })
         };
@@ -428,21 +442,27 @@ impl SurfacePipelines {
         }
     }
 
-    fn make(&mut self, gpu: &Context, layouts: &SurfaceLayouts, (cull, varied): (Cull, bool)) {
-        self.pipelines.entry((cull, varied)).or_insert_with(|| {
-            let (vertex_entry, fragment_entry) = match (varied, self.ignores_color) {
-                (true, _) => ("varied", self.varied),
-                (false, true) => ("position", self.plain),
-                (false, false) => ("plain", self.plain),
+    fn make(&mut self, gpu: &Context, layouts: &SurfaceLayouts, key: PipelineKey) {
+        self.pipelines.entry(key).or_insert_with(|| {
+            let PipelineKey { cull, varied, is_apart } = key;
+            let (vertex_entries, fragment_entry) = match (varied, self.ignores_color) {
+                (true, _) => (["varied", "varied_apart"], self.varied),
+                (false, true) => (["position", "position_apart"], self.plain),
+                (false, false) => (["plain", "plain_apart"], self.plain),
             };
+            let corners = [Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Corner>() as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &Corner::ATTRIBUTES,
+            })];
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(self.label),
                 layout: Some(&self.layout),
                 vertex: wgpu::VertexState {
                     module: &layouts.vertex,
-                    entry_point: Some(vertex_entry),
+                    entry_point: Some(vertex_entries[usize::from(is_apart)]),
                     compilation_options: Default::default(),
-                    buffers: &[],
+                    buffers: if is_apart { &[] } else { &corners },
                 },
                 primitive: wgpu::PrimitiveState {
                     cull_mode: (cull != Cull::None).then_some(wgpu::Face::Back),

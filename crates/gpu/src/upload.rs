@@ -1,26 +1,28 @@
-//! A scene on the GPU: all meshes in four storage buffers and an index buffer, textures with the mip levels of the core.
-//! Kept while the scene's revision stays the same.
+//! A scene on the GPU: corners and indices of each mesh to draw it, all meshes in three storage buffers for what shaders
+//! have to know of whole triangles, textures with the mip levels of the core. Kept while the scene's revision stays the same.
 
-mod provoking;
+pub(crate) mod corners;
 
 use glam::Vec3;
 use pellucid_core::texture::MipLevel;
 use pellucid_core::{Scene, Texture};
 use wgpu::{BindGroup, BufferUsages, TextureUsages};
 
-use self::provoking::SharedCorners;
+use self::corners::Corners;
 use crate::gpu_data::MeshPlaces;
 use crate::surface::SurfaceLayouts;
 use crate::{Context, GpuError};
 
 /// A mesh of the scene, and how far its vertices reach.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct MeshUpload {
     pub(crate) places: MeshPlaces,
     /// Greatest coordinate of a vertex that is used, on each axis; NaN or infinite if there is such a vertex.
     pub(crate) reach: Vec3,
-    /// Place of its first index in [`SceneUpload::order`], if triangles share corners.
-    pub(crate) first_shared: Option<u32>,
+    /// The vertex buffer.
+    pub(crate) corners: wgpu::Buffer,
+    /// The index buffer.
+    pub(crate) order: wgpu::Buffer,
 }
 
 /// A scene on the GPU.
@@ -29,8 +31,6 @@ pub(crate) struct SceneUpload {
     pub(crate) revision: u64,
     pub(crate) meshes: Vec<MeshUpload>,
     pub(crate) bind_group: BindGroup,
-    /// The index buffer.
-    pub(crate) order: wgpu::Buffer,
     pub(crate) textures: Vec<BindGroup>,
 }
 
@@ -39,8 +39,6 @@ impl SceneUpload {
         let mut positions: Vec<f32> = Vec::new();
         let mut attributes: Vec<f32> = Vec::new();
         let mut indices: Vec<u32> = Vec::new();
-        let mut shared_corners: Vec<[u32; 2]> = Vec::new();
-        let mut order: Vec<u32> = Vec::new();
         let mut meshes = Vec::with_capacity(scene.meshes().len());
         for mesh in scene.meshes() {
             let mut places = MeshPlaces {
@@ -56,28 +54,20 @@ impl SceneUpload {
             attributes.extend_from_slice(bytemuck::cast_slice(mesh.colors().unwrap_or_default()));
             positions.extend_from_slice(bytemuck::cast_slice(mesh.positions()));
             indices.extend(mesh.triangles().as_flattened().iter().map(|&vertex| places.first_vertex + vertex));
-            let mut first_shared = None;
-            // Without normals, every triangle has its own.
-            if mesh.normals().is_some() {
-                let shared = SharedCorners::of(mesh.triangles(), mesh.positions().len());
-                if shared.pays() {
-                    first_shared = Some(place(&order)?);
-                    let first_corner = place(shared_corners.as_flattened())? / 2;
-                    order.extend(shared.order.as_flattened().iter().map(|&corner| first_corner + corner));
-                    let first_vertex = places.first_vertex;
-                    shared_corners.extend(shared.corners.iter().map(|&[vertex, of]| [first_vertex + vertex, of]));
-                }
-            }
-            meshes.push(MeshUpload { places, reach: reach(mesh), first_shared });
+            let Corners { corners, order } = Corners::of(mesh, places.first_vertex);
+            meshes.push(MeshUpload {
+                places,
+                reach: reach(mesh),
+                corners: upload(gpu, "a mesh's corners", &corners, BufferUsages::VERTEX)?,
+                order: upload(gpu, "a mesh's indices", order.as_flattened(), BufferUsages::INDEX)?,
+            });
         }
         let buffers = [
             upload(gpu, "the scene's positions", &positions, BufferUsages::STORAGE)?,
             upload(gpu, "the scene's attributes", &attributes, BufferUsages::STORAGE)?,
             upload(gpu, "the scene's indices", &indices, BufferUsages::STORAGE)?,
-            upload(gpu, "the scene's corners", shared_corners.as_flattened(), BufferUsages::STORAGE)?,
         ];
-        let order = upload(gpu, "the scene's order of corners", &order, BufferUsages::INDEX)?;
-        let entries = [0, 1, 2, 3]
+        let entries = [0, 1, 2]
             .map(|binding| wgpu::BindGroupEntry { binding, resource: buffers[binding as usize].as_entire_binding() });
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
@@ -90,7 +80,7 @@ impl SceneUpload {
             .map(|texture| Ok(layouts.texture_bind_group(gpu, &upload_texture(gpu, texture)?)))
             .collect::<Result<_, GpuError>>()?;
         gpu.check()?;
-        Ok(Self { revision: scene.revision(), meshes, bind_group, order, textures })
+        Ok(Self { revision: scene.revision(), meshes, bind_group, textures })
     }
 }
 
