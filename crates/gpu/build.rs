@@ -79,7 +79,7 @@ fn main() {
         for (name, folder, stem, read_only) in [
             ("LFB_CAPTURE", "lfb", "module", false),
             ("LFB_READ", "lfb", "module", true),
-            ("LFB_SORT", "pass", "sort", false),
+            ("LFB_SORT", "lfb", "sort", false),
         ] {
             linked.insert(format!("{name}_{words}"), link_interface(folder, stem, words, read_only));
         }

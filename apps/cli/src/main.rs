@@ -2,7 +2,7 @@
 //!
 //! Results go to stdout or the file named, everything else to stderr. Exit code 0: done; 1: failed; 2: the command line
 //! itself has no meaning. A reader that closes the pipe early is no failure.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod args;
 mod camera;
@@ -37,7 +37,19 @@ impl std::fmt::Display for UsageError {
 
 impl std::error::Error for UsageError {}
 
+/// On Linux, Mesa asks a window system which GPU it likes best, and where there is none complains on stderr. Pellucid
+/// chooses itself, unless the user has told Mesa.
+#[expect(unsafe_code, reason = "the environment is how Mesa is told")]
+fn choose_devices_ourselves() {
+    let is_told = ["NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT"].iter().any(|name| std::env::var_os(name).is_some());
+    if !is_told {
+        // SAFETY: no other thread has been started that could read or write the environment.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}
+
 fn main() -> ExitCode {
+    choose_devices_ourselves();
     let result = match Args::try_parse() {
         Ok(args) => run(args.command),
         Err(error) => {

@@ -213,7 +213,7 @@ impl Memory {
             self.buffers.remove(name);
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        let buffer = gpu.buffer(name, bytes, usage)?;
+        let buffer = gpu.buffer(name, bytes, usage | wgpu::BufferUsages::INDIRECT)?;
         self.buffers.insert(name, buffer.clone());
         self.peak_bytes = self.peak_bytes.max(self.held_bytes());
         Ok(buffer)

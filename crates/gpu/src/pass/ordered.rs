@@ -1,21 +1,41 @@
-//! From a captured LFB to ordered fragments to the picture: the steps "sort" and "read and blend", the same for every
-//! technique that is an LFB. Twins: `shaders/pass/{sort,resolve}.wesl`, linked with the technique's own module.
+//! From a captured LFB to ordered fragments to the picture, the same for every technique that is an LFB. Twins:
+//! `shaders/pass/{classify,sort,resolve}.wesl`, linked with the technique's own module.
+//!
+//! Step "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs, and finishes those
+//! without any. Each class has shaders of its own, dispatched over its list. On the way to the resolve, in "read and blend",
+//! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 256 by heap
+//! sort in a local array; more are sorted in place before, in "sort", in O(n log n) and no memory but the capture's own.
+//! With `presort` all are.
 
 use std::collections::HashMap;
 
 use pellucid_core::Resolve;
-use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
 
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
 use crate::pass::gather::Gather;
 use crate::pass::picture::GROUP_PX;
-use crate::surface::shader;
+use crate::surface::{shader, storage_entry};
 use crate::{Context, GpuError};
+
+/// Classes of runs, and pixels of a run. Twins in `shaders/shared/classes.wesl`.
+const CLASSES: u64 = 4;
+const RUN_PX: u64 = 64;
+
+/// Workgroups in a row of a dispatch. Twin in `shaders/shared/classes.wesl`.
+const GRID_WIDTH: u64 = 32_768;
+
+/// Bytes of an indirect dispatch.
+const DISPATCH_BYTES: u64 = 12;
+
+const RUNS: &str = "runs of pixels";
+const DISPATCHES: &str = "dispatches";
 
 /// The passes over an LFB, linked with its technique.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LfbShaders {
+    pub(crate) classify: &'static str,
     pub(crate) sort: &'static str,
     pub(crate) resolve: &'static str,
     pub(crate) gather: &'static str,
@@ -24,11 +44,16 @@ pub(crate) struct LfbShaders {
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct OrderedPasses {
+    /// Group 1, lists; and for the making of dispatches group 2.
+    buffer: BindGroupLayout,
+    prepare: ComputePipeline,
     sort: ComputePipeline,
+    classify_module: ShaderModule,
     resolve_module: ShaderModule,
-    resolve_layouts: [BindGroupLayout; 2],
-    /// One for each resolve that was asked for.
-    resolves: HashMap<u32, ComputePipeline>,
+    layouts: [BindGroupLayout; 2],
+    /// One for each entry point and resolve that was asked for, and one for each classification.
+    resolves: HashMap<(&'static str, u32), ComputePipeline>,
+    classifies: HashMap<(bool, u32), ComputePipeline>,
     gather: Gather,
 }
 
@@ -40,28 +65,84 @@ impl OrderedPasses {
         picture_layout: &BindGroupLayout,
         lfb_layout: &BindGroupLayout,
     ) -> Self {
-        let layouts = [Some(picture_layout), None, None, Some(lfb_layout)];
+        let buffer = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("classes"),
+            entries: &[storage_entry(0, ShaderStages::COMPUTE, false)],
+        });
+        let layouts = [Some(picture_layout), Some(&buffer), None, Some(lfb_layout)];
+        let prepare_layouts = [Some(picture_layout), Some(&buffer), Some(&buffer), Some(lfb_layout)];
         let sort_module = shader(gpu, "sort", shaders.sort);
+        let classify_module = shader(gpu, "classify", shaders.classify);
         Self {
+            prepare: compute_pipeline(gpu, "classify", &classify_module, "prepare", &prepare_layouts, &[]),
             sort: compute_pipeline(gpu, "sort", &sort_module, "main", &layouts, &[]),
+            classify_module,
             resolve_module: shader(gpu, "read and blend", shaders.resolve),
-            resolve_layouts: [picture_layout.clone(), lfb_layout.clone()],
+            layouts: [picture_layout.clone(), lfb_layout.clone()],
+            buffer,
             resolves: HashMap::new(),
+            classifies: HashMap::new(),
             gather: Gather::new(gpu, shaders.gather, picture_layout, lfb_layout),
         }
     }
 
+    /// All buffers it takes for so many pixels, with their bytes.
+    pub(crate) fn needs(pixels: u64) -> [(&'static str, u64); 2] {
+        [(RUNS, CLASSES * (1 + pixels.div_ceil(RUN_PX)) * 4), (DISPATCHES, CLASSES * DISPATCH_BYTES)]
+    }
+
     /// Records everything that comes after the capture of a window: towards the picture, or towards layers.
     pub(crate) fn record(&mut self, frame: &mut Frame<'_>, window: Window, lfb: &BindGroup) -> Result<(), GpuError> {
+        let gpu = frame.gpu;
+        let code = resolve_code(frame.resolve);
         let wants_layers = matches!(frame.goal, Goal::Layers(_));
-        if wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_)) {
+        let needs_order = wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
+        let sorts_all = wants_layers || frame.presort;
+        let one_class = sorts_all || !needs_order;
+
+        let [(_, runs_bytes), (_, dispatches_bytes)] = Self::needs(window.pixels());
+        let runs = frame.memory.buffer(gpu, RUNS, runs_bytes)?;
+        let dispatches = frame.memory.buffer(gpu, DISPATCHES, dispatches_bytes)?;
+        let bind_group = |buffer: &wgpu::Buffer| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("classes"),
+                layout: &self.buffer,
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+            })
+        };
+        let (classes, prepared) = (bind_group(&runs), bind_group(&dispatches));
+        let groups = [&frame.picture.bind_group.clone(), &classes, lfb];
+
+        frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
+        let mut pass = frame.compute_pass("classify")?;
+        set_groups(&mut pass, groups);
+        pass.set_pipeline(self.classify(gpu, one_class, code));
+        let all_runs = window.pixels().div_ceil(RUN_PX);
+        pass.dispatch_workgroups(all_runs.min(GRID_WIDTH) as u32, all_runs.div_ceil(GRID_WIDTH) as u32, 1);
+        pass.set_pipeline(&self.prepare);
+        pass.set_bind_group(2, &prepared, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        drop(pass);
+
+        let class = |number: u64| number * DISPATCH_BYTES;
+        let [few, some, more, many] = [0, 1, 2, 3].map(class);
+        if needs_order {
             let mut pass = frame.compute_pass("sort")?;
+            set_groups(&mut pass, groups);
             pass.set_pipeline(&self.sort);
-            dispatch_window(&mut pass, frame, window, lfb);
+            pass.dispatch_workgroups_indirect(&dispatches, many);
         }
         let mut pass = frame.compute_pass("read and blend")?;
-        pass.set_pipeline(self.resolve(frame.gpu, frame.resolve));
-        dispatch_window(&mut pass, frame, window, lfb);
+        set_groups(&mut pass, groups);
+        let entries: &[(&'static str, u64)] = match (needs_order, sorts_all) {
+            (false, _) => &[("unordered", many)],
+            (true, true) => &[("in_order", many)],
+            (true, false) => &[("few", few), ("some", some), ("more", more), ("in_order", many)],
+        };
+        for &(entry, dispatch) in entries {
+            pass.set_pipeline(self.resolve(gpu, entry, code));
+            pass.dispatch_workgroups_indirect(&dispatches, dispatch);
+        }
         drop(pass);
         if wants_layers {
             self.gather.read(frame, window, lfb)?;
@@ -69,20 +150,29 @@ impl OrderedPasses {
         Ok(())
     }
 
-    fn resolve(&mut self, gpu: &Context, resolve: Resolve) -> &ComputePipeline {
-        let code = resolve_code(resolve);
-        self.resolves.entry(code).or_insert_with(|| {
-            let [picture, lfb] = &self.resolve_layouts;
-            compute_pipeline(
-                gpu,
-                "read and blend",
-                &self.resolve_module,
-                "main",
-                &[Some(picture), None, None, Some(lfb)],
-                &[("resolve", f64::from(code))],
-            )
+    fn classify(&mut self, gpu: &Context, one_class: bool, code: u32) -> &ComputePipeline {
+        let [picture, lfb] = &self.layouts;
+        let layouts = [Some(picture), Some(&self.buffer), None, Some(lfb)];
+        self.classifies.entry((one_class, code)).or_insert_with(|| {
+            let constants = [("one_class", f64::from(u8::from(one_class))), ("resolve", f64::from(code))];
+            compute_pipeline(gpu, "classify", &self.classify_module, "main", &layouts, &constants)
         })
     }
+
+    fn resolve(&mut self, gpu: &Context, entry: &'static str, code: u32) -> &ComputePipeline {
+        let [picture, lfb] = &self.layouts;
+        let layouts = [Some(picture), Some(&self.buffer), None, Some(lfb)];
+        self.resolves.entry((entry, code)).or_insert_with(|| {
+            let constants = [("resolve", f64::from(code))];
+            compute_pipeline(gpu, "read and blend", &self.resolve_module, entry, &layouts, &constants)
+        })
+    }
+}
+
+fn set_groups(pass: &mut wgpu::ComputePass<'_>, [picture, classes, lfb]: [&BindGroup; 3]) {
+    pass.set_bind_group(0, picture, &[]);
+    pass.set_bind_group(1, classes, &[]);
+    pass.set_bind_group(3, lfb, &[]);
 }
 
 /// Number of a resolve in `shaders/shared/resolve.wesl`.

@@ -94,6 +94,7 @@ impl Storage {
     /// Everything for so many pixels and layers. Textures are told one by one, as each is its own thing to the limits.
     fn needs(self, gpu: &Context, pixels: u64, layers: u64) -> Vec<(&'static str, u64)> {
         let mut needs = vec![(COUNTS, (pixels + 1) * 4)];
+        needs.extend(OrderedPasses::needs(pixels));
         match self {
             Self::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
             Self::Texture => {
@@ -147,6 +148,7 @@ impl ABuffer {
             Storage::Buffer => (
                 shaders::ABUFFER,
                 LfbShaders {
+                    classify: shaders::CLASSIFY_ABUFFER,
                     sort: shaders::SORT_ABUFFER,
                     resolve: shaders::RESOLVE_ABUFFER,
                     gather: shaders::GATHER_ABUFFER,
@@ -155,6 +157,7 @@ impl ABuffer {
             Storage::Texture => (
                 shaders::ABUFFER_TEXTURE,
                 LfbShaders {
+                    classify: shaders::CLASSIFY_ABUFFER_TEXTURE,
                     sort: shaders::SORT_ABUFFER_TEXTURE,
                     resolve: shaders::RESOLVE_ABUFFER_TEXTURE,
                     gather: shaders::GATHER_ABUFFER_TEXTURE,

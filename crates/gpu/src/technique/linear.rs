@@ -51,8 +51,12 @@ impl Linear {
             own_layout: Some(&layout),
         };
         let pipelines = |pass| SurfacePipelines::new(gpu, layouts.surfaces, &pass);
-        let ordered_shaders =
-            LfbShaders { sort: shaders::SORT_LINEAR, resolve: shaders::RESOLVE_LINEAR, gather: shaders::GATHER_LINEAR };
+        let ordered_shaders = LfbShaders {
+            classify: shaders::CLASSIFY_LINEAR,
+            sort: shaders::SORT_LINEAR,
+            resolve: shaders::RESOLVE_LINEAR,
+            gather: shaders::GATHER_LINEAR,
+        };
         Self {
             count: pipelines(pass("count render", "count", "count_varied", true)),
             capture: pipelines(pass("main render", "capture", "capture_varied", false)),
@@ -66,6 +70,7 @@ impl Linear {
     fn needs(pixels: u64, fragments: u64) -> Vec<(&'static str, u64)> {
         let mut needs = vec![(OFFSETS, (pixels + 1) * 4), (FRAGMENTS, fragments * FRAGMENT_BYTES)];
         needs.extend(PrefixSum::needs(pixels + 1));
+        needs.extend(OrderedPasses::needs(pixels));
         needs
     }
 

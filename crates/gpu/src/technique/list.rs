@@ -59,8 +59,12 @@ impl List {
             depth_stencil: depth_state(false, false),
             own_layout: Some(&layout),
         };
-        let ordered_shaders =
-            LfbShaders { sort: shaders::SORT_LIST, resolve: shaders::RESOLVE_LIST, gather: shaders::GATHER_LIST };
+        let ordered_shaders = LfbShaders {
+            classify: shaders::CLASSIFY_LIST,
+            sort: shaders::SORT_LIST,
+            resolve: shaders::RESOLVE_LIST,
+            gather: shaders::GATHER_LIST,
+        };
         Self {
             capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
             ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
@@ -71,8 +75,10 @@ impl List {
     }
 
     /// All buffers of a window with so many pixels and nodes.
-    fn needs(pixels: u64, nodes: u64) -> [(&'static str, u64); 3] {
-        [(HEADS, (pixels * HEAD_WORDS + 1) * 4), (NEXTS, nodes * NEXT_BYTES), (FRAGMENTS, nodes * FRAGMENT_BYTES)]
+    fn needs(pixels: u64, nodes: u64) -> [(&'static str, u64); 5] {
+        let [runs, dispatches] = OrderedPasses::needs(pixels);
+        let heads = (HEADS, (pixels * HEAD_WORDS + 1) * 4);
+        [heads, (NEXTS, nodes * NEXT_BYTES), (FRAGMENTS, nodes * FRAGMENT_BYTES), runs, dispatches]
     }
 
     /// Captures with room for so many nodes; says how many there are, and, if there was room for them, where.
@@ -85,7 +91,7 @@ impl List {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let needs = Self::needs(pixels, room);
         frame.memory.make_room(&needs);
-        let [heads, nexts, fragments] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
+        let [heads, nexts, fragments, ..] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
         let (heads, nexts, fragments) = (heads?, nexts?, fragments?);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("list"),

@@ -84,8 +84,12 @@ impl Pages {
             depth_stencil: depth_state(false, false),
             own_layout: Some(&layout),
         };
-        let ordered_shaders =
-            LfbShaders { sort: shaders::SORT_PAGES, resolve: shaders::RESOLVE_PAGES, gather: shaders::GATHER_PAGES };
+        let ordered_shaders = LfbShaders {
+            classify: shaders::CLASSIFY_PAGES,
+            sort: shaders::SORT_PAGES,
+            resolve: shaders::RESOLVE_PAGES,
+            gather: shaders::GATHER_PAGES,
+        };
         Self {
             capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
             ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
@@ -96,8 +100,10 @@ impl Pages {
     }
 
     /// All buffers of a window with so many pixels and pages.
-    fn needs(pixels: u64, pages: u64) -> [(&'static str, u64); 3] {
-        [(HEADS, (pixels * HEAD_WORDS + 1) * 4), (LINKS, pages * LINK_BYTES), (FRAGMENTS, pages * PAGE_BYTES)]
+    fn needs(pixels: u64, pages: u64) -> [(&'static str, u64); 5] {
+        let [runs, dispatches] = OrderedPasses::needs(pixels);
+        let heads = (HEADS, (pixels * HEAD_WORDS + 1) * 4);
+        [heads, (LINKS, pages * LINK_BYTES), (FRAGMENTS, pages * PAGE_BYTES), runs, dispatches]
     }
 
     fn fits(frame: &Frame<'_>, pixels: u64, pages: u64) -> bool {
@@ -109,7 +115,7 @@ impl Pages {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let needs = Self::needs(pixels, room);
         frame.memory.make_room(&needs);
-        let [heads, links, fragments] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
+        let [heads, links, fragments, ..] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
         let (heads, links, fragments) = (heads?, links?, fragments?);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("pages"),
