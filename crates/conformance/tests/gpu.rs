@@ -1,28 +1,17 @@
 //! Every exact technique of the GPU against the oracle, in every case of the suite; its bits at any budget and every time.
 
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer};
+mod common;
+
+use pellucid::core::oracle;
+use pellucid::gpu::GpuError;
 use pellucid::{Error, Renderer, Resolve, Technique, View};
-use pellucid_conformance::suite::{CASES, Candidate, Check};
+use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
+
+use common::gpu;
 
 /// Exact techniques that run on the GPU.
 fn techniques() -> impl Iterator<Item = Technique> {
     Technique::ALL.into_iter().filter(|technique| technique.backend() == "gpu" && technique.is_exact())
-}
-
-/// The best device there is; `None`, with a notice, unless `PELLUCID_REQUIRE_GPU` is 1.
-fn gpu(floor: bool) -> Option<GpuRenderer> {
-    // Software devices may take gigabytes for the deepest scenes: asked for, not by the way.
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
-        return None;
-    }
-    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
-        Ok(gpu) => Some(gpu),
-        Err(error @ GpuError::NoAdapter) => {
-            panic!("PELLUCID_REQUIRE_GPU is 1, but: {error}")
-        }
-        Err(error) => panic!("{error}"),
-    }
 }
 
 /// With every useful feature, and on the portability floor. All failures are listed, not the first alone: what fails
@@ -65,9 +54,11 @@ fn bits_depend_on_neither_budget_nor_repetition() {
         for source in cases {
             let scene = pellucid::load(source).unwrap().scene;
             let view = View::of(&scene).size(97, 65).opacity(0.8);
+            // The first frame still holds what the scene before took.
+            renderer.render(&scene, &view, Resolve::Blend).unwrap();
             let whole = renderer.render(&scene, &view, Resolve::Blend).unwrap();
             assert_eq!(whole.stats.windows, 1);
-            for _ in 0..4 {
+            for _ in 0..20 {
                 let again = renderer.render(&scene, &view, Resolve::Blend).unwrap();
                 assert!(again.image == whole.image, "{technique}, {source}: another picture the second time");
             }
@@ -83,6 +74,62 @@ fn bits_depend_on_neither_budget_nor_repetition() {
             renderer = renderer.technique(technique);
         }
     }
+}
+
+#[test]
+fn sorting_before_the_resolve_changes_no_bit() {
+    for technique in [Technique::Linear, Technique::List, Technique::ABuffer, Technique::Pages] {
+        for source in ["@planes:n=300", "@hairball:strands=60", "@gallery"] {
+            let (Some(device), Some(presorting)) = (gpu(false), gpu(false)) else { return };
+            let scene = pellucid::load(source).unwrap().scene;
+            let view = View::of(&scene).size(61, 35).opacity(0.8);
+            let renderer = Renderer::new().gpu(device).technique(technique);
+            let presorted = Renderer::new().gpu(presorting.presort(true)).technique(technique);
+            for resolve in [Resolve::Blend, Resolve::Gelly, Resolve::Layer(3)] {
+                let (a, b) = (renderer.render(&scene, &view, resolve), presorted.render(&scene, &view, resolve));
+                assert!(a.unwrap().image == b.unwrap().image, "{technique}, {source}, {resolve}");
+            }
+        }
+    }
+}
+
+/// Files of the folder in `PELLUCID_SCENES`, which are too large for the project: skipped with a notice where it is not.
+#[test]
+fn real_scenes_agree_with_the_oracle() {
+    let Some(folder) = std::env::var_os("PELLUCID_SCENES") else {
+        eprintln!("skipped: set PELLUCID_SCENES to a folder of scenes");
+        return;
+    };
+    let Some(device) = gpu(false) else { return };
+    let mut candidate = Candidate::new(Technique::Linear, Renderer::new().gpu(device));
+    let mut failures = Vec::new();
+    for (path, opacity) in [
+        ("stanford_bunny/bunny_69k.ply", 0.3),
+        ("utah_teapot/teapot.obj", 0.5),
+        ("gltf/AlphaBlendModeTest/AlphaBlendModeTest.glb", 1.0),
+        ("gltf/GlassVaseFlowers/GlassVaseFlowers.glb", 1.0),
+        ("brain/brain_fsaverage5.glb", 1.0),
+    ] {
+        let path = std::path::Path::new(&folder).join(path);
+        if !path.exists() {
+            eprintln!("skipped: there is no '{}'", path.display());
+            continue;
+        }
+        let scene = pellucid::load_file(&path).unwrap().scene;
+        let view = View::of(&scene).size(64, 48).opacity(opacity);
+        let capture = oracle::capture(&scene, &view).unwrap();
+        let prepared = Prepared { scene, view, capture };
+        for technique in techniques() {
+            candidate = candidate.technique(technique);
+            for check in Check::ALL {
+                let comparison = prepared.run(check, &candidate).unwrap();
+                if !comparison.passes() {
+                    failures.push(format!("{technique}, {}, {check}: {comparison:?}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 #[test]

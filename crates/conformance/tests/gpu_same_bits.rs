@@ -1,22 +1,12 @@
 //! Layered fragment buffers differ in where they keep fragments and in nothing else: on one device all give the same bits.
 
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer};
+mod common;
+
 use pellucid::{Image, Layers, Renderer, Scene, Technique, View};
 use pellucid_conformance::layers;
 use pellucid_conformance::suite::{CASES, Check};
 
-/// A device, if they are asked for; see `gpu.rs`.
-fn gpu(floor: bool) -> Option<GpuRenderer> {
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
-        return None;
-    }
-    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
-        Ok(gpu) => Some(gpu),
-        Err(error @ GpuError::NoAdapter) => panic!("PELLUCID_REQUIRE_GPU is 1, but: {error}"),
-        Err(error) => panic!("{error}"),
-    }
-}
+use common::gpu;
 
 /// Its layers and every resolve of them.
 fn everything(renderer: &Renderer, scene: &Scene, view: &View) -> (Layers, Vec<Image>) {

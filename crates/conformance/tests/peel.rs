@@ -1,12 +1,16 @@
 //! Depth peeling: coplanar fragments, layers that are cut off, and what is recorded once and replayed.
 
+mod common;
+
 use glam::{Affine3A, Quat, Vec3, Vec4};
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer};
+use pellucid::gpu::GpuRenderer;
 use pellucid::{
     AlphaMode, Frame, Image, Instance, Layers, Material, Mesh, Renderer, Resolve, Scene, Shading, Technique, View,
 };
 use pellucid_conformance::images::{TOLERANCE, compare, difference};
 use pellucid_conformance::layers::{gather, is_covered};
+
+use common::gpu;
 
 const RESOLVES: [Resolve; 7] = [
     Resolve::Blend,
@@ -17,22 +21,6 @@ const RESOLVES: [Resolve; 7] = [
     Resolve::Layer(3),
     Resolve::Complexity(0),
 ];
-
-/// `None`, with a notice, unless `PELLUCID_REQUIRE_GPU` is 1.
-fn gpu(floor: bool) -> Option<GpuRenderer> {
-    // Software devices may take gigabytes for the deepest scenes: asked for, not by the way.
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
-        return None;
-    }
-    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
-        Ok(gpu) => Some(gpu),
-        Err(error @ GpuError::NoAdapter) => {
-            panic!("PELLUCID_REQUIRE_GPU is 1, but: {error}")
-        }
-        Err(error) => panic!("{error}"),
-    }
-}
 
 fn peel(gpu: GpuRenderer) -> Renderer {
     Renderer::new().gpu(gpu).technique(Technique::Peel)

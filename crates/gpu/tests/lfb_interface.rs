@@ -1,5 +1,7 @@
 //! The LFB in a renderer of one's own: known answers, every payload, two at once, and every way it can be misused.
 
+mod common;
+
 use pellucid_gpu::lfb::{Access, Lfb, LfbData, LfbError, LfbModule, LfbOptions, Nearest};
 use pellucid_gpu::wgpu;
 
@@ -8,15 +10,11 @@ mod two_views;
 
 /// Devices of somebody else: on WebGPU's default limits, and on all the adapter has. Their errors panic.
 fn devices() -> Vec<(wgpu::Device, wgpu::Queue)> {
-    // Software devices may take gigabytes for the deepest scenes: asked for, not by the way.
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
+    if common::renderer(true).is_none() {
         return Vec::new();
     }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let Ok(adapter) = pollster::block_on(instance.request_adapter(&Default::default())) else {
-        panic!("PELLUCID_REQUIRE_GPU is 1, but there is no adapter");
-    };
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).expect("there was one just now");
     [
         (wgpu::Limits::defaults(), wgpu::Features::empty()),
         (adapter.limits(), adapter.features() & wgpu::Features::all_webgpu_mask()),

@@ -104,7 +104,8 @@ impl List {
 impl Adapter {
     fn to_text(&self) -> String {
         let Self { name, api, driver, .. } = self;
-        let kind = if self.software { ", software: used only when asked for by --backend gpu or a technique" } else { "" };
+        let kind =
+            if self.software { ", software: used only when asked for by --backend gpu or a technique" } else { "" };
         let features = match self.features.as_slice() {
             [] => "no optional features".to_owned(),
             features => features.join(", "),

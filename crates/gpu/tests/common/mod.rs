@@ -2,17 +2,15 @@
 
 use pellucid_gpu::{ContextOptions, GpuError, GpuRenderer};
 
-/// A renderer on the best device there is; `None`, with a notice, unless `PELLUCID_REQUIRE_GPU` is 1.
+/// A renderer on the best device there is. Without a real GPU it is `None`, with a notice, unless `PELLUCID_REQUIRE_GPU` is
+/// 1: software ones take minutes and are asked for, not by the way.
 pub(crate) fn renderer(floor: bool) -> Option<GpuRenderer> {
-    // Software devices may take gigabytes for the deepest scenes: asked for, not by the way.
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
-        return None;
-    }
-    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
-        Ok(renderer) => Some(renderer),
-        Err(error @ GpuError::NoAdapter) => {
-            panic!("PELLUCID_REQUIRE_GPU is 1, but: {error}")
+    let is_required = std::env::var("PELLUCID_REQUIRE_GPU").as_deref() == Ok("1");
+    match GpuRenderer::new(&ContextOptions { floor, allow_software: is_required }) {
+        Ok(gpu) => Some(gpu),
+        Err(error @ (GpuError::NoAdapter | GpuError::OnlySoftware { .. })) if !is_required => {
+            eprintln!("skipped: {error}; PELLUCID_REQUIRE_GPU=1 makes it a failure, and takes a software GPU");
+            None
         }
         Err(error) => panic!("{error}"),
     }
