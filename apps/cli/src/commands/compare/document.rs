@@ -8,7 +8,7 @@ use super::observation::Observation;
 use super::reference::Reference;
 use super::spots::{Spot, spots};
 use crate::report::{SCHEMA, Step};
-use crate::words::{duration, full_count, memory, plural};
+use crate::words::{duration, full_count, memory, plural, table};
 
 #[derive(Serialize)]
 pub(super) struct Document {
@@ -192,18 +192,9 @@ impl Document {
             "ambiguous",
             "unexplained",
         ];
-        let rows: Vec<[String; 11]> =
-            [heading.map(str::to_owned)].into_iter().chain(self.techniques.iter().map(Entry::cells)).collect();
-        let widths: [usize; 11] =
-            std::array::from_fn(|i| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0));
-        for row in &rows {
-            let [name, numbers @ ..] = row;
-            text += &format!("{name:0$}", widths[0]);
-            for (number, width) in numbers.iter().zip(&widths[1..]) {
-                text += &format!("  {number:>width$}");
-            }
-            text += "\n";
-        }
+        let mut rows = vec![heading.map(str::to_owned).to_vec()];
+        rows.extend(self.techniques.iter().map(|entry| entry.cells().to_vec()));
+        text += &table(&rows);
         text
     }
 }

@@ -4,7 +4,6 @@
 //! figures (`measure`), and what is said of them: `document` as JSON, CSV and text, `report` as a page.
 
 mod document;
-mod folder;
 mod measure;
 mod observation;
 mod pictures;
@@ -16,13 +15,13 @@ use anyhow::Context;
 use pellucid::Technique;
 
 use crate::args::UNSORTED;
+use crate::commands::folder::Folder;
 use crate::commands::{warn_about, warn_about_dropped};
 use crate::plan::{ComparePlan, Compared};
 use crate::progress::Progress;
 use crate::report::to_json;
 use crate::{legend, terminal};
 use document::Document;
-use folder::Folder;
 use measure::{Measured, measure};
 use observation::Observation;
 use reference::Reference;
