@@ -146,7 +146,7 @@ pub(crate) struct CompareArgs {
 #[derive(Debug, clap::Args)]
 pub(crate) struct BenchArgs {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(bench::suite_names()),
-        help = suite_help())]
+        hide_possible_values = true, help = suite_help())]
     pub(crate) suite: Vec<String>,
 
     /// The folder of the real scenes; built-in ones of like size stand in for those that are not in it

@@ -33,7 +33,7 @@ pub(crate) struct BenchPlan {
 
 const MAX_REPEATS: u32 = 10_000;
 const MAX_TIME_LIMIT_S: u32 = 86_400;
-/// Frames of a `--quick` run.
+/// Most frames of a `--quick` run.
 const QUICK_REPEATS: u32 = 2;
 
 impl BenchPlan {
@@ -57,7 +57,7 @@ impl BenchPlan {
             backend: args.backend,
             threads: threads as usize,
             budget_bytes,
-            repeats: if args.quick { QUICK_REPEATS } else { repeats },
+            repeats: if args.quick { repeats.min(QUICK_REPEATS) } else { repeats },
             time_limit: Duration::from_secs(seconds.into()),
             quick: args.quick,
             fresh: args.fresh,

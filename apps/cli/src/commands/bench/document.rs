@@ -159,7 +159,7 @@ impl Session {
         if (kept.schema, kept.version.as_str()) != (SCHEMA, VERSION) {
             bail!("{}", others(&format!("version {} of this program, which is {VERSION}", kept.version)));
         }
-        if kept.hardware != self.hardware {
+        if !kept.hardware.is_same_device(&self.hardware) {
             bail!("{}", others(&format!("another device ({})", kept.hardware.in_words())));
         }
         if let Some(difference) = self.terms.difference(&kept.plan) {

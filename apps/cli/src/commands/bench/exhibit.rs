@@ -44,42 +44,45 @@ pub(super) fn exhibits(chapter: &Chapter) -> Vec<Exhibit> {
     chapter.series.shows.iter().flat_map(|&show| exhibit(chapter, show)).collect()
 }
 
-/// Why there are no figures, each reason once; and what stands in for what.
+/// What is to be said besides: why figures are missing, what stands in for what, what was captured in parts.
 pub(super) fn remarks(chapter: &Chapter) -> Vec<String> {
-    let mut reasons: Vec<(&str, Vec<(&str, Vec<&str>)>)> = Vec::new();
-    for point in &chapter.results {
-        for result in &point.results {
-            let Some(reason) = result.reason() else { continue };
-            let at = reasons.iter().position(|(known, _)| *known == reason).unwrap_or_else(|| {
-                reasons.push((reason, Vec::new()));
-                reasons.len() - 1
-            });
-            let names = &mut reasons[at].1;
-            match names.iter_mut().find(|(name, _)| *name == result.name) {
-                Some((_, points)) => points.push(&point.label),
-                None => names.push((&result.name, vec![&point.label])),
-            }
+    let stand_ins = chapter.results.iter().filter(|point| point.stands_in);
+    let stand_ins =
+        stand_ins.map(|point| format!("{}: {} stands in for a file that is not there", point.label, point.scene));
+    missing(chapter).into_iter().chain(stand_ins).chain(chapter.results.iter().filter_map(windows)).collect()
+}
+
+/// Why figures are missing, each reason once.
+fn missing(chapter: &Chapter) -> Vec<String> {
+    let mut reasons: Vec<&str> = Vec::new();
+    for reason in chapter.results.iter().flat_map(|point| &point.results).filter_map(|result| result.reason()) {
+        if !reasons.contains(&reason) {
+            reasons.push(reason);
         }
     }
-    let everywhere = chapter.results.len();
-    let mut remarks: Vec<String> = Vec::new();
-    for (reason, names) in reasons {
-        let (all, some): (Vec<_>, Vec<_>) = names.into_iter().partition(|(_, points)| points.len() == everywhere);
-        let all = all.into_iter().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let some = some.into_iter().map(|(name, points)| format!("{name} at {}", points.join(", ")));
-        let what: Vec<String> = Some(all).filter(|all| !all.is_empty()).into_iter().chain(some).collect();
-        remarks.push(format!("not measured: {}: {reason}", what.join("; ")));
-    }
-    for point in chapter.results.iter().filter(|point| point.stands_in) {
-        remarks.push(format!("{}: {} stands in for a file that is not there", point.label, point.scene));
-    }
-    let cut = |point: &PointResult| point.results.iter().any(|result| result.figures().is_some_and(|f| f.windows > 1));
-    for point in chapter.results.iter().filter(|point| cut(point)) {
-        let split = point.results.iter().filter_map(|result| Some((&result.name, result.figures()?.windows)));
-        let split: Vec<String> = split.filter(|(_, n)| *n > 1).map(|(name, n)| format!("{name} in {n}")).collect();
-        remarks.push(format!("{}: captured in windows of the picture: {}", point.label, split.join(", ")));
-    }
-    remarks
+    let labels = |name: &str, reason: &str| -> Vec<&str> {
+        let is_so = |point: &&PointResult| {
+            point.results.iter().any(|result| result.name == name && result.reason() == Some(reason))
+        };
+        chapter.results.iter().filter(is_so).map(|point| &*point.label).collect()
+    };
+    let sentence = |reason: &str| {
+        let what = chapter.names().into_iter().filter_map(|name| match labels(&name, reason) {
+            labels if labels.is_empty() => None,
+            labels if labels.len() == chapter.results.len() => Some(name),
+            labels => Some(format!("{name} at {}", labels.join(", "))),
+        });
+        format!("not measured: {}: {reason}", what.collect::<Vec<_>>().join("; "))
+    };
+    reasons.into_iter().map(sentence).collect()
+}
+
+/// Which techniques captured a point in windows of the picture.
+fn windows(point: &PointResult) -> Option<String> {
+    let windows = point.results.iter().filter_map(|result| Some((&result.name, result.figures()?.windows)));
+    let split: Vec<String> =
+        windows.filter(|(_, count)| *count > 1).map(|(name, count)| format!("{name} in {count}")).collect();
+    (!split.is_empty()).then(|| format!("{}: captured in windows of the picture: {}", point.label, split.join("; ")))
 }
 
 /// The power laws of time over the axis, by the variant's name.
@@ -174,11 +177,13 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 12] = [
+const STEP_ORDER: [&str; 14] = [
     "transform",
     "clip, setup and bin",
     "raster, sort, shade and resolve",
     "opaque",
+    "blend",
+    "compose",
     "zero",
     "count render",
     "prefix sums",

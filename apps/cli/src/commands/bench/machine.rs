@@ -32,7 +32,7 @@ struct Gpu {
 }
 
 /// The hardware in words; results of one are not continued on another.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Hardware {
     /// The processor's own name.
     pub(super) cpu: String,
@@ -128,6 +128,11 @@ impl Machine {
 }
 
 impl Hardware {
+    /// Whether times are comparable; a system may have been updated.
+    pub(super) fn is_same_device(&self, other: &Self) -> bool {
+        (&self.cpu, self.cores, &self.gpu) == (&other.cpu, other.cores, &other.gpu)
+    }
+
     /// `AMD EPYC 9B45, 2 cores, 24.0 GiB; llvmpipe (software GPU); Debian 12`.
     pub(super) fn in_words(&self) -> String {
         let gpu = match &self.gpu {

@@ -154,13 +154,71 @@ impl Candidate {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+    use pellucid::Technique;
+
     use super::*;
+    use crate::args::{Args, Command};
+    use crate::commands::bench::pace::Work;
+    use crate::commands::bench::suite::Source;
+    use crate::commands::bench::suites::SUITES;
+    use crate::plan::BenchPlan;
 
     #[test]
     fn turns_share_the_frames() {
         for repeats in [1, 2, 3, 7, 15] {
             assert_eq!((0..TURNS).map(|turn| share_of(repeats, turn)).sum::<u32>(), repeats);
         }
+    }
+
+    /// What is measured of a small scene by a machine whose CPU renderer took so long for it before.
+    fn measured(known_ms: f64, scene: &str) -> PointResult {
+        let Command::Bench(args) =
+            Args::try_parse_from(["pellucid", "bench", "-o", "out", "--backend", "cpu"]).unwrap().command
+        else {
+            unreachable!()
+        };
+        let plan = BenchPlan::new(*args).unwrap();
+        let scene = pellucid::load(scene).unwrap().scene;
+        let work = Work::new(1e5, 100.0, 10.0);
+        let point = Point::new("point", Source::BuiltIn("@boxes:n=2".into()), work).size(32, 16);
+        let variants = [Technique::Cpu, Technique::Alpha].map(Variant::of).to_vec();
+        let series = Series {
+            name: "series",
+            title: "",
+            about: "",
+            axis: None,
+            variants,
+            points: vec![point.clone()],
+            shows: &[],
+            published: None,
+        };
+        let mut pace = Pace::default();
+        pace.learn(Variant::of(Technique::Cpu), &work, point.pixels(), known_ms);
+        let mut result = PointResult::new(&point, "@boxes:n=2".into(), false);
+        let effort = Effort { repeats: 5, time_limit: Duration::from_secs(30) };
+        let view = View::new(&scene, 32, 16);
+        let mut machine = Machine::open(&plan).unwrap();
+        measure((&SUITES[0], &series, &point), &mut machine, (&scene, &view), effort, &mut pace, &mut result);
+        result
+    }
+
+    #[test]
+    fn as_many_frames_as_asked_for_count_and_none_without_a_device() {
+        let result = measured(1.0, "@boxes:n=2");
+        let [cpu, alpha] = &result.results[..] else { panic!() };
+        assert_eq!(cpu.figures().map(|figures| (figures.frames, figures.samples_ms.len())), Some((5, 5)));
+        assert!(matches!(&alpha.outcome, Outcome::Skipped { reason } if reason.contains("--backend cpu")));
+        assert_eq!(result.triangles, Some(96));
+    }
+
+    #[test]
+    fn what_would_take_too_long_is_skipped_unseen_with_a_reason() {
+        let result = measured(20_000.0, "@boxes:n=2");
+        let Outcome::Skipped { reason } = &result.results[0].outcome else { panic!() };
+        assert!(reason.starts_with("would take some 20.0 s a frame"), "{reason}");
+        // Nothing was rendered at all.
+        assert_eq!(result.triangles, None);
     }
 
     #[test]

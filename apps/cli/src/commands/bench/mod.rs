@@ -29,7 +29,7 @@ use crate::commands::folder::Folder;
 use crate::plan::BenchPlan;
 use crate::progress::Progress;
 use crate::terminal;
-use crate::words::{duration, plural, table};
+use crate::words::{plural, table};
 use document::{CSV, Chapter, JSON, Session, Terms};
 use machine::Machine;
 use measure::{Effort, measure};
@@ -134,7 +134,7 @@ fn announce(plan: &BenchPlan, session: &Session, machine: &Machine, effort: Effo
     }
     if !plan.quiet {
         lines.push(vec!["in all".to_owned(), format!("about {}", rough(total_s))]);
-        let limit = duration(effort.time_limit.as_secs_f64() * 1e3);
+        let limit = rough(effort.time_limit.as_secs_f64());
         let frames = plural(plan.repeats.into(), "frame");
         terminal::note(&format!("To measure, {frames} of each technique at each point, at most {limit} of each:"));
         terminal::note(table(&lines).trim_end());

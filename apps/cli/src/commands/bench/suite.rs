@@ -170,7 +170,7 @@ impl Point {
         self
     }
 
-    pub(super) fn from_side(mut self, side: Side) -> Self {
+    pub(super) fn seen_from(mut self, side: Side) -> Self {
         self.look = CameraPlan { side: Some(side), ..CameraPlan::default() };
         self
     }

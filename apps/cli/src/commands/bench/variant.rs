@@ -38,14 +38,14 @@ impl Variant {
         self.technique.backend() == "gpu"
     }
 
-    /// As in tables: `peel, 4 layers`.
+    /// As in tables: `peel (4 layers)`.
     pub(super) fn name(self) -> String {
         let name = self.technique.name();
         match self {
-            Self { max_layers: Some(layers), .. } => format!("{name}, {layers} layers"),
-            Self { threads: Some(1), .. } => format!("{name}, 1 thread"),
-            Self { threads: Some(threads), .. } => format!("{name}, {threads} threads"),
-            Self { storage: Storage::Texture, .. } => format!("{name}, textures"),
+            Self { max_layers: Some(layers), .. } => format!("{name} ({layers} layers)"),
+            Self { threads: Some(1), .. } => format!("{name} (1 thread)"),
+            Self { threads: Some(threads), .. } => format!("{name} ({threads} threads)"),
+            Self { storage: Storage::Texture, .. } => format!("{name} (textures)"),
             _ => name.to_owned(),
         }
     }

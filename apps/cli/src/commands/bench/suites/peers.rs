@@ -21,7 +21,7 @@ fn scenes() -> Series {
     // Seen from two sides each.
     let around = |label: &str, source: Source, work: Work| {
         [(Side::Front, "front"), (Side::Iso, "iso")].map(|(side, name)| {
-            Point::new(format!("{label}, {name}"), source.clone(), work).opacity(0.3).from_side(side)
+            Point::new(format!("{label}, {name}"), source.clone(), work).opacity(0.3).seen_from(side)
         })
     };
     let atrium = |name: &str, eye, target| {
