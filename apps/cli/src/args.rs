@@ -119,9 +119,13 @@ pub(crate) struct CompareArgs {
     pub(crate) output: PathBuf,
 
     /// What is compared, separated by commas: `unsorted`, which is blending in draw order, and names from `pellucid
-    /// techniques` [default: unsorted, and all that run on the backend but the oracle]
+    /// techniques` [default: unsorted, and all that run on the backend but the oracle; those that do not order fragments
+    /// only for the resolve blend]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(compared_names()))]
     pub(crate) techniques: Vec<String>,
+
+    #[arg(long, value_name = "NAME", default_value = "blend", hide_default_value = true, help = resolve_help())]
+    pub(crate) resolve: String,
 
     /// What they are held against; only the oracle knows where pixels are ambiguous, and it is slow [default: the oracle
     /// where it takes seconds, else the CPU renderer, which equals it]
@@ -131,6 +135,11 @@ pub(crate) struct CompareArgs {
     /// Colour behind everything: a CSS name, hex (#rgb, #rrggbb, #rrggbbaa), or none for a transparent picture
     #[arg(long, value_name = "COLOUR", default_value = DEFAULT_BACKGROUND)]
     pub(crate) background: String,
+
+    /// Length in world units over which a material shows its stated opacity in gelly and blend:corrected [default: a
+    /// quarter of the scene's radius]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) thickness: Option<String>,
 
     /// Say nothing but the table and errors
     #[arg(short, long)]
