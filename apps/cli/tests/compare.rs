@@ -77,7 +77,7 @@ fn exact_is_equal_and_unsorted_is_not() {
 fn every_resolve_is_compared() {
     let work = Workplace::new();
     for resolve in ["gelly", "blend:corrected", "nearest", "layer:2", "complexity"] {
-        let line = format!("@glass:shells=1,sides=8 {SMALL} --resolve {resolve} --opacity 0.5");
+        let line = format!("@boxes:n=3 {SMALL} --resolve {resolve} --opacity 0.5");
         work.succeed(&format!("compare {line} -o out --reference oracle"));
         // Unlike those of `render`, pictures of complexity bear no legend here.
         if resolve != "complexity" {
