@@ -123,7 +123,7 @@ impl Machine {
             Some(renderer) => renderer,
             None => open_gpu(budget_bytes, variant.storage, true)?,
         };
-        Ok(kept.insert(renderer.max_layers(variant.max_layers)))
+        Ok(kept.insert(renderer.max_layers(variant.max_layers).presort(variant.presort)))
     }
 }
 

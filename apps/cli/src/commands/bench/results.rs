@@ -41,6 +41,8 @@ pub(super) struct Measurement {
     pub(super) storage: Option<String>,
     /// After which peeling stops.
     pub(super) max_layers: Option<u32>,
+    /// Whether an LFB is sorted in a step of its own.
+    pub(super) presort: bool,
     #[serde(flatten)]
     pub(super) outcome: Outcome,
 }
@@ -154,6 +156,7 @@ impl Measurement {
             storage: (variant.technique == pellucid::Technique::ABuffer)
                 .then(|| if is_textures { "texture" } else { "buffer" }.to_owned()),
             max_layers: variant.max_layers,
+            presort: variant.presort,
             outcome,
         }
     }

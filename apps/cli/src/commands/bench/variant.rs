@@ -13,12 +13,14 @@ pub(super) struct Variant {
     pub(super) storage: Storage,
     /// After which peeling stops.
     pub(super) max_layers: Option<u32>,
+    /// Whether fragments are sorted in a step of their own, rather than where they are read.
+    pub(super) presort: bool,
 }
 
 impl Variant {
     /// A technique as it usually is.
     pub(super) fn of(technique: Technique) -> Self {
-        Self { technique, threads: None, storage: Storage::Buffer, max_layers: None }
+        Self { technique, threads: None, storage: Storage::Buffer, max_layers: None, presort: false }
     }
 
     pub(super) fn threads(threads: usize) -> Self {
@@ -34,6 +36,11 @@ impl Variant {
         Self { max_layers: Some(max_layers), ..Self::of(Technique::Peel) }
     }
 
+    /// An LFB that is sorted in a step of its own.
+    pub(super) fn presorted(technique: Technique) -> Self {
+        Self { presort: true, ..Self::of(technique) }
+    }
+
     pub(super) fn is_on_gpu(self) -> bool {
         self.technique.backend() == "gpu"
     }
@@ -45,6 +52,7 @@ impl Variant {
             Self { max_layers: Some(layers), .. } => format!("{name} ({layers} layers)"),
             Self { threads: Some(1), .. } => format!("{name} (1 thread)"),
             Self { threads: Some(threads), .. } => format!("{name} ({threads} threads)"),
+            Self { presort: true, .. } => format!("{name} (presort)"),
             Self { storage: Storage::Texture, .. } => format!("{name} (textures)"),
             _ => name.to_owned(),
         }

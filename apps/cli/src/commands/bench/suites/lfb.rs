@@ -22,6 +22,12 @@ const SOURCE: &str =
     "Knowles, Leach, Zambetta: Efficient Layered Fragment Buffer Techniques (OpenGL Insights, chapter 20)";
 const HARDWARE: &str = "GeForce GTX 460, 1920 x 1080";
 
+/// Those whose steps are told apart are also sorted in a step of its own.
+fn variants_in_steps() -> Vec<Variant> {
+    let presorted = [Technique::Linear, Technique::List].map(Variant::presorted);
+    [variants(), presorted.to_vec()].concat()
+}
+
 fn variants() -> Vec<Variant> {
     use Technique::{ABuffer, Alpha, Cpu, Linear, List, Pages};
     [Alpha, Cpu, Linear, List, Pages, ABuffer].map(Variant::of).to_vec()
@@ -36,7 +42,7 @@ fn steps() -> Series {
         about: "The chapter's two meshes, all of them translucent, from views with about as many fragments as it had: the \
                 dragon with few layers in a part of the picture, the atrium with many everywhere.",
         axis: None,
-        variants: variants(),
+        variants: variants_in_steps(),
         points: vec![
             dragon.size(SIZE.0, SIZE.1).between([-0.005, 0.125, 0.36], [-0.005, 0.125, 0.0]),
             atrium.size(SIZE.0, SIZE.1).between([-8.0, 2.0, 0.0], [0.0, 3.0, 0.0]),
@@ -109,7 +115,7 @@ fn depth() -> Series {
         about: "More and more layers of grids that cover less and less of the picture: about 8 million fragments and 500 to \
                 1000 triangles throughout.",
         axis: Some(Axis { name: "layers", unit: "layer", is_log: true }),
-        variants: variants(),
+        variants: variants_in_steps(),
         points: [4, 8, 16, 32, 64, 128, 256].map(point).to_vec(),
         shows: &[Show::Times, Show::Ratios, Show::SortShares, Show::Memory],
         published: Some(Published {
