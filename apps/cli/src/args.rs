@@ -186,7 +186,7 @@ pub(crate) struct BenchArgs {
 
     /// Most seconds that one technique may take at one point; what would take longer gets fewer frames, and what cannot
     /// do a few in that time is skipped, with a word on it
-    #[arg(long, value_name = "SECONDS", default_value = "30", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
     pub(crate) time_limit: String,
 
     /// Only the first points of each series, small and with few frames, to see what there would be

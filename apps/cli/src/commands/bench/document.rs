@@ -168,8 +168,11 @@ impl Session {
         for chapter in &mut self.chapters {
             let suite = kept.suites.iter().find(|suite| suite.name == chapter.suite.name);
             let series = suite.and_then(|suite| suite.series.iter().find(|series| series.name == chapter.series.name));
-            let is_planned =
-                |result: &&PointResult| chapter.series.points.iter().any(|point| point.label == result.label);
+            let names = chapter.names();
+            let is_planned = |result: &&PointResult| {
+                let is_there = chapter.series.points.iter().any(|point| point.label == result.label);
+                is_there && result.results.iter().map(|result| &result.name).eq(&names)
+            };
             let points = series.map_or(&[][..], |series| &series.points);
             chapter.results = points.iter().filter(is_planned).filter(|result| result.is_final()).cloned().collect();
         }

@@ -11,7 +11,7 @@ use super::exhibit::{Form, Plot};
 use super::scale::Scale;
 
 /// Colours of variants, and of steps; told apart by most eyes, and on light and dark pages.
-const COLORS: [RGBColor; 12] = [
+const COLORS: [RGBColor; 14] = [
     RGBColor(0x3a, 0x5b, 0xd9),
     RGBColor(0xe0, 0x7b, 0x1f),
     RGBColor(0x1f, 0x9d, 0x77),
@@ -24,6 +24,8 @@ const COLORS: [RGBColor; 12] = [
     RGBColor(0x9a, 0x5f, 0x3b),
     RGBColor(0x7f, 0x86, 0x92),
     RGBColor(0x4f, 0x5a, 0x6b),
+    RGBColor(0xf0, 0xa8, 0xb8),
+    RGBColor(0x14, 0x6b, 0x6b),
 ];
 const GREY: RGBColor = RGBColor(0x88, 0x88, 0x88);
 const WIDTH: u32 = 760;

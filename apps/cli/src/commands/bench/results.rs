@@ -181,7 +181,8 @@ impl Figures {
     /// Of one frame or more.
     pub(super) fn new(frames: &[Stats]) -> Option<Self> {
         let last = frames.last()?;
-        let samples_ms: Vec<f64> = frames.iter().map(|stats| stats.total_ms).collect();
+        // Nanoseconds are finer than any clock that matters here.
+        let samples_ms: Vec<f64> = frames.iter().map(|stats| (stats.total_ms * 1e6).round() / 1e6).collect();
         let times = Samples::new(samples_ms.clone())?;
         // A frame that had to be repeated has steps that others have not.
         let median_of = |name: &str| {

@@ -45,7 +45,7 @@ fn steps() -> Series {
         variants: variants_in_steps(),
         points: vec![
             dragon.size(SIZE.0, SIZE.1).between([-0.005, 0.125, 0.36], [-0.005, 0.125, 0.0]),
-            atrium.size(SIZE.0, SIZE.1).between([-8.0, 2.0, 0.0], [0.0, 3.0, 0.0]),
+            atrium.size(SIZE.0, SIZE.1).between([-6.0, 2.0, 0.0], [0.0, 3.0, 0.0]),
         ],
         shows: &[Show::Steps, Show::Times, Show::Ratios, Show::Memory],
         published: Some(Published {

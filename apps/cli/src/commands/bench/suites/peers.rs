@@ -37,8 +37,8 @@ fn scenes() -> Series {
     points.extend(around("bunny", bunny, Work::new(0.3e6, 144_046.0, 8.0)));
     points.extend(around("dragon", DRAGON, Work::new(0.3e6, 871_414.0, 10.0)));
     points.extend(around("hair", hair, Work::new(3.5e6, 1_026_000.0, 356.0)));
-    points.push(atrium("along", [-9.0, 1.5, 0.0], [0.0, 2.5, 0.0]));
-    points.push(atrium("across", [0.0, 5.0, -4.0], [6.0, 2.0, 3.0]));
+    points.push(atrium("along", [-6.0, 2.0, 0.0], [2.0, 3.0, 0.0]));
+    points.push(atrium("across", [3.0, 2.0, -3.0], [-6.0, 3.0, 2.0]));
     points.extend(around("conference", conference, Work::new(4e6, 331_179.0, 40.0)));
     points.extend(around("oak", oak, Work::new(2e6, 36_006.0, 60.0)));
     points.extend(around("brain", brain, Work::new(2e6, 81_920.0, 20.0)));

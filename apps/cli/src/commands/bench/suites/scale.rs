@@ -111,7 +111,7 @@ fn threads(cores: usize) -> Series {
         variants: counts.into_iter().map(Variant::threads).collect(),
         points: vec![
             Point::new("boxes", built_in("@boxes:n=20"), boxes).opacity(0.3),
-            planes("planes".into(), 64, 1024),
+            planes("planes".into(), 16, 1024),
             Point::new("spheres", built_in("@spheres:n=680"), Work::new(2.2e6, 870_400.0, 30.0)).opacity(0.3),
         ],
         shows: &[Show::Times, Show::Speedups],
