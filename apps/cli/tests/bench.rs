@@ -79,6 +79,33 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
 }
 
 #[test]
+fn a_software_gpu_is_measured_if_asked_for_and_told_apart_from_exact() {
+    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
+        return eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
+    }
+    let work = Workplace::new();
+    let outcome = work.succeed("bench --suite peel,abuffer --quick --backend gpu -o out");
+    assert!(!outcome.stdout.contains("not measured"), "{}", outcome.stdout);
+    let report = json(&work, "out");
+    let points = points(&report);
+    let of = |point: usize, name: &str| {
+        let results = points[point]["results"].as_array().unwrap();
+        results.iter().find(|result| result["name"] == name).unwrap()
+    };
+    assert!(
+        points.iter().all(|point| point["results"][0]["alpha_ratio"] == 1.0 && point["results"][0]["exact"] == false)
+    );
+    let (cut, exact) = (of(1, "peel (4 layers)"), of(1, "peel"));
+    assert_eq!((&cut["max_layers"], &cut["exact"]), (&4.into(), &false.into()));
+    assert!(cut["cut_pixels"].as_u64().unwrap() > of(1, "peel (8 layers)")["cut_pixels"].as_u64().unwrap());
+    assert_eq!((&exact["exact"], &exact["cut_pixels"]), (&true.into(), &0.into()));
+    let (buffers, textures) = (of(2, "abuffer"), of(2, "abuffer (textures)"));
+    assert_eq!((&buffers["storage"], &textures["storage"]), (&"buffer".into(), &"texture".into()));
+    // A fragment takes 20 bytes in textures, 16 in buffers.
+    assert!(textures["peak_bytes"].as_u64() > buffers["peak_bytes"].as_u64());
+}
+
+#[test]
 fn figures_have_every_key_of_the_schema() {
     let work = Workplace::new();
     work.succeed(&format!("bench --suite scale,peel {QUICK} -o out"));
