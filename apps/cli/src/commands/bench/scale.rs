@@ -57,7 +57,11 @@ impl Scale {
 
     fn logarithmic(low: f64, high: f64) -> Self {
         // Where there are few powers of ten, what lies between is marked too.
-        let steps: &[f64] = if high / low < 150.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let steps: &[f64] = match high / low {
+            ..6.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+            ..150.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
         let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
         let marks = decades.flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)));
         let marks = marks.filter(|mark| (low..=high).contains(mark)).collect();
@@ -121,6 +125,7 @@ mod tests {
         assert_eq!(of(&[0.0, 20e6], false), ["0", "5 M", "10 M", "15 M", "20 M"]);
         assert_eq!(of(&[1.0, 4096.0], true), ["1", "10", "100", "1000"]);
         assert_eq!(of(&[0.15, 2.2], true), ["0.2", "0.5", "1", "2"]);
+        assert_eq!(of(&[9.0, 16.5], true), ["10", "15"]);
         assert_eq!(of(&[], true)[0], "0");
     }
 
