@@ -299,6 +299,8 @@ fn peers(chapter: &Chapter) -> Vec<Exhibit> {
         heading(title, [String::new()].into_iter().chain(cells))
     };
     table.push(summary("geometric mean", &geometric_mean));
+    let counts = all.iter().map(|column| column.len().to_string());
+    table.push(heading("of so many points", [String::new()].into_iter().chain(counts)));
     table.push(summary("least", &|column| column.iter().copied().min_by(f64::total_cmp)));
     let plot = Plot { values: "time over that of the CPU renderer".into(), is_log: true, form: Form::Rows { rows } };
     vec![Exhibit { title: "Time over that of the CPU renderer".into(), table, plot: Some(plot) }]
