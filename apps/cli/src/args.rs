@@ -7,6 +7,8 @@ use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 use pellucid::{Resolve, Technique};
 
+use crate::commands::bench;
+
 /// Exact transparency in any order of submission, no GPU needed.
 #[derive(Debug, Parser)]
 #[command(name = "pellucid", version, arg_required_else_help = true, after_help = EXAMPLES)]
@@ -24,6 +26,7 @@ Examples:
   pellucid render @boxes:n=8 -o depth.png --resolve complexity
   pellucid info model.glb
   pellucid compare @gallery -o report
+  pellucid bench --suite lfb -o results
   pellucid verify
 
 Exit codes: 0 done, 1 failed, 2 the command line is wrong.";
@@ -36,6 +39,8 @@ pub(crate) enum Command {
     Info(Box<InfoArgs>),
     /// Render a view with several techniques, and report them side by side
     Compare(Box<CompareArgs>),
+    /// Time techniques on this device, suite by suite, beside the figures that were published
+    Bench(Box<BenchArgs>),
     /// Hold this device against the oracle
     Verify(VerifyArgs),
     /// List the built-in scenes and their parameters
@@ -114,9 +119,13 @@ pub(crate) struct CompareArgs {
     pub(crate) output: PathBuf,
 
     /// What is compared, separated by commas: `unsorted`, which is blending in draw order, and names from `pellucid
-    /// techniques` [default: unsorted, and all that run on the backend but the oracle]
+    /// techniques` [default: unsorted, and all that run on the backend but the oracle; those that do not order fragments
+    /// only for the resolve blend]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(compared_names()))]
     pub(crate) techniques: Vec<String>,
+
+    #[arg(long, value_name = "NAME", default_value = "blend", hide_default_value = true, help = resolve_help())]
+    pub(crate) resolve: String,
 
     /// What they are held against; only the oracle knows where pixels are ambiguous, and it is slow [default: the oracle
     /// where it takes seconds, else the CPU renderer, which equals it]
@@ -127,6 +136,11 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "COLOUR", default_value = DEFAULT_BACKGROUND)]
     pub(crate) background: String,
 
+    /// Length in world units over which a material shows its stated opacity in gelly and blend:corrected [default: a
+    /// quarter of the scene's radius]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) thickness: Option<String>,
+
     /// Say nothing but the table and errors
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -136,6 +150,56 @@ pub(crate) struct CompareArgs {
 
     #[command(flatten)]
     pub(crate) device: DeviceArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct BenchArgs {
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(bench::suite_names()),
+        hide_possible_values = true, help = suite_help())]
+    pub(crate) suite: Vec<String>,
+
+    /// The folder of the real scenes; built-in ones of like size stand in for those that are not in it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scenes: Option<PathBuf>,
+
+    /// The folder for figures and report; made if only it is missing. What is finished is kept in it: the same command
+    /// goes on where it was stopped
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+
+    /// What is measured; auto: the CPU, and a real GPU if there is one; gpu: the GPU in any case, a software one too,
+    /// beside the CPU. The suite `peers` takes a software GPU by itself, unless this is cpu
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    pub(crate) backend: Backend,
+
+    /// Threads of the CPU renderer; 0 is one for each core
+    #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
+    pub(crate) threads: String,
+
+    /// Bytes that a GPU capture may hold, such as 512M
+    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
+    pub(crate) budget: Option<String>,
+
+    /// Frames measured of a technique at a point, besides those that warm it up
+    #[arg(long, value_name = "N", default_value = "15", allow_hyphen_values = true)]
+    pub(crate) repeats: String,
+
+    /// Most seconds that one technique may take at one point; what would take longer gets fewer frames, and what cannot
+    /// do a few in that time is skipped, with a word on it
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
+    pub(crate) time_limit: String,
+
+    /// Only the first points of each series, small and with few frames, to see what there would be
+    #[arg(long)]
+    pub(crate) quick: bool,
+
+    /// Start over, whatever is in the folder
+    #[arg(long)]
+    pub(crate) fresh: bool,
+
+    /// Say nothing but the tables and errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -290,6 +354,12 @@ fn resolve_help() -> String {
     let width = Resolve::NAMES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let names = Resolve::NAMES.iter().map(|(name, meaning)| format!("\n  {name:width$}  {meaning}"));
     format!("What the ordered layers become [default: blend]:{}", names.collect::<String>())
+}
+
+fn suite_help() -> String {
+    let width = bench::SUITES.iter().map(|suite| suite.name.len()).max().unwrap_or(0);
+    let suites = bench::SUITES.iter().map(|suite| format!("\n  {:width$}  {}", suite.name, suite.summary));
+    format!("What is measured, separated by commas [default: all]:{}", suites.collect::<String>())
 }
 
 fn compared_names() -> Vec<&'static str> {

@@ -75,6 +75,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Render(args) => commands::render::run(&plan::RenderPlan::new(*args)?),
         Command::Info(args) => commands::info::run(&plan::InfoPlan::new(*args)?),
         Command::Compare(args) => commands::compare::run(&plan::ComparePlan::new(*args)?),
+        Command::Bench(args) => commands::bench::run(&plan::BenchPlan::new(*args)?),
         Command::Verify(args) => commands::verify::run(plan::VerifyPlan::new(args)?),
         Command::Scenes(args) => commands::scenes::run(args.json),
         Command::Techniques(args) => commands::techniques::run(args.json),

@@ -1,5 +1,6 @@
 //! What a command line means: every value checked, defaults in place, nothing left to interpret but the scene.
 
+mod bench;
 mod capture;
 mod compare;
 mod verify;
@@ -16,6 +17,7 @@ use crate::args::{InfoArgs, RenderArgs, ShadingArg, ViewArgs};
 use crate::camera::CameraPlan;
 use crate::values;
 
+pub(crate) use bench::BenchPlan;
 pub(crate) use capture::{CapturePlan, Opened};
 pub(crate) use compare::{ComparePlan, Compared};
 pub(crate) use verify::VerifyPlan;

@@ -21,10 +21,20 @@ pub(crate) struct Progress {
 impl Progress {
     /// For so many pictures; `None` for work that has no number.
     pub(crate) fn new(pictures: Option<u32>, quiet: bool) -> Self {
-        let (bar, template) = match pictures {
-            Some(count) => (ProgressBar::new(count.into()), "{msg:10} [{bar:40}] {pos}/{len}, {eta} left"),
-            None => (ProgressBar::new_spinner(), "{spinner} {msg} ({elapsed})"),
-        };
+        match pictures {
+            Some(count) => {
+                Self::of(ProgressBar::new(count.into()), "{msg:10} [{bar:40}] {pos}/{len}, {eta} left", quiet)
+            }
+            None => Self::of(ProgressBar::new_spinner(), "{spinner} {msg} ({elapsed})", quiet),
+        }
+    }
+
+    /// For work that should take so many seconds.
+    pub(crate) fn timed(seconds: f64, quiet: bool) -> Self {
+        Self::of(ProgressBar::new(ticks(seconds)), "[{bar:30}] {percent} %, {eta} left; {msg} ({elapsed})", quiet)
+    }
+
+    fn of(bar: ProgressBar, template: &str, quiet: bool) -> Self {
         bar.set_draw_target(ProgressDrawTarget::hidden());
         // The default style is as good if a template should ever be wrong.
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -45,10 +55,20 @@ impl Progress {
         self.bar.inc(1);
     }
 
+    /// What should have taken so many seconds is done.
+    pub(crate) fn advance(&self, seconds: f64) {
+        self.bar.inc(ticks(seconds));
+    }
+
     /// Writes lines to stderr without tearing the bar.
     pub(crate) fn suspend(&self, write: impl FnOnce()) {
         self.bar.suspend(write);
     }
+}
+
+/// Work of so many seconds in the bar's own units.
+fn ticks(seconds: f64) -> u64 {
+    (seconds * 1e3) as u64
 }
 
 /// Shows the bar after a while, unless the sender is gone by then. A system without threads to spare shows none.

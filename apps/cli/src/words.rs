@@ -33,6 +33,17 @@ pub(crate) fn duration(ms: f64) -> String {
     }
 }
 
+/// A figure with three digits that count: `0.0123`, `12.3`, `1,234`.
+pub(crate) fn figure(value: f64) -> String {
+    if value.abs() >= 999.5 {
+        return full_count(value.round() as u64);
+    }
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    // What is rounded up to the next power of ten has a digit more before its point.
+    let magnitude = if (value.abs() / 10f64.powi(magnitude)) >= 9.995 { magnitude + 1 } else { magnitude };
+    format!("{value:.*}", (2 - magnitude).clamp(0, 9) as usize)
+}
+
 /// An amount of memory at a glance: `853 B`, `12.4 KiB`, `1.2 GiB`.
 pub(crate) fn memory(bytes: u64) -> String {
     const UNITS: [(u64, &str); 3] = [(1 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
@@ -45,6 +56,21 @@ pub(crate) fn memory(bytes: u64) -> String {
 /// `1 picture`, `2 pictures`.
 pub(crate) fn plural(count: u64, noun: &str) -> String {
     format!("{} {noun}{}", full_count(count), if count == 1 { "" } else { "s" })
+}
+
+/// Rows in columns two spaces apart: the first flush left, the others flush right. The first row is the heading.
+pub(crate) fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |i: usize| rows.iter().filter_map(|row| row.get(i)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| match i {
+            0 => format!("{cell:width$}"),
+            _ => format!("  {cell:>width$}"),
+        });
+        cells.collect::<String>().trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
 }
 
 /// Names and texts in two columns, each line indented.
@@ -72,6 +98,29 @@ mod tests {
         ] {
             assert_eq!((full_count(count).as_str(), short_count(count).as_str()), (full, short));
         }
+    }
+
+    #[test]
+    fn figures_have_three_digits() {
+        for (value, text) in [
+            (0.0, "0.00"),
+            (0.012_34, "0.0123"),
+            (0.999_9, "1.00"),
+            (9.994, "9.99"),
+            (9.996, "10.0"),
+            (99.96, "100"),
+            (123.4, "123"),
+            (999.6, "1,000"),
+            (12_345.6, "12,346"),
+        ] {
+            assert_eq!(figure(value), text);
+        }
+    }
+
+    #[test]
+    fn tables_line_up() {
+        let rows = [["a", "bb"], ["ccc", "d"]].map(|row| row.map(str::to_owned).to_vec());
+        assert_eq!(table(&rows), "a    bb\nccc   d\n");
     }
 
     #[test]

@@ -35,7 +35,7 @@ fn the_folder_holds_pictures_figures_and_a_report() {
         "unsorted.png",
     ];
     assert_eq!(names_in(&work.path("out")), expected);
-    assert!(outcome.stdout.starts_with("@boxes:n=3: 96 x 64, "), "{}", outcome.stdout);
+    assert!(outcome.stdout.starts_with("@boxes:n=3: blend, 96 x 64, "), "{}", outcome.stdout);
     assert!(outcome.stdout.contains("\nunsorted ") && outcome.stdout.contains("\ncpu "), "{}", outcome.stdout);
     assert!(outcome.stderr.trim_end().ends_with("index.html: open it in a browser"), "{}", outcome.stderr);
     for name in expected.iter().filter(|name| name.ends_with(".png") && **name != "layers.png") {
@@ -71,6 +71,26 @@ fn exact_is_equal_and_unsorted_is_not() {
     assert_eq!((&cpu["unexplained"], &cpu["agrees"]), (&0.into(), &true.into()));
     assert!(unsorted["unexplained"].as_u64().unwrap() > 0 && unsorted["total_ms"].is_null());
     assert!(unsorted["psnr"].as_f64().unwrap() < 60.0 && unsorted["flip"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn every_resolve_is_compared() {
+    let work = Workplace::new();
+    for resolve in ["gelly", "blend:corrected", "nearest", "layer:2", "complexity"] {
+        let line = format!("@boxes:n=3 {SMALL} --resolve {resolve} --opacity 0.5");
+        work.succeed(&format!("compare {line} -o out --reference oracle"));
+        // Unlike those of `render`, pictures of complexity bear no legend here.
+        if resolve != "complexity" {
+            work.succeed(&format!("render {line} -o plain.png"));
+            let plain = work.png("plain.png");
+            assert!(work.png("out/reference.png") == plain && work.png("out/cpu.png") == plain, "{resolve}");
+        }
+        let report = json(&work, "out/compare.json");
+        assert_eq!(report["resolve"], resolve);
+        let techniques = report["techniques"].as_array().unwrap();
+        assert_eq!((techniques.len(), &techniques[0]["name"]), (1, &"cpu".into()), "what does not order is left out");
+        assert_eq!((&techniques[0]["unexplained"], &techniques[0]["agrees"]), (&0.into(), &true.into()), "{resolve}");
+    }
 }
 
 #[test]
@@ -164,6 +184,10 @@ fn what_cannot_be_done_is_said_and_leaves_nothing_behind() {
         ("compare @boxes -o out --background bleu", 2, "CSS"),
         ("compare @boxes -o out --backend cpu --techniques alpha", 2, "runs on the gpu"),
         ("compare @boxes -o out --budget lots", 2, "512M"),
+        ("compare @boxes -o out --resolve sum", 2, "'sum'"),
+        ("compare @boxes -o out --resolve gelly --techniques unsorted", 2, "serves blend alone"),
+        ("compare @boxes -o out --resolve nearest --techniques cpu,alpha", 2, "'alpha' does not order"),
+        ("compare @boxes -o out --thickness 0", 2, "above 0"),
     ] {
         let outcome = work.run(line);
         assert_eq!(outcome.code, code, "{line}: {}", outcome.stderr);

@@ -23,14 +23,23 @@ fn options<'a>(texts: impl IntoIterator<Item = &'a str>) -> BTreeSet<&'a str> {
 }
 
 #[test]
-fn options_of_render() {
-    let help = Workplace::new().succeed("render --help").stdout;
-    // An option's own line begins with its name, its description follows after two spaces.
-    let lines = help.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
-    let mut there = options(lines.map(|line| line.split("  ").next().unwrap_or_default()));
-    there.remove("--help");
-    let column = first_column("Options of `render`");
-    assert_eq!(options(column.iter().map(String::as_str)), there);
+fn options_of_render_and_bench() {
+    for command in ["render", "bench"] {
+        let help = Workplace::new().succeed(&format!("{command} --help")).stdout;
+        // An option's own line begins with its name, its description follows after two spaces.
+        let lines = help.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
+        let mut there = options(lines.map(|line| line.split("  ").next().unwrap_or_default()));
+        there.remove("--help");
+        let column = first_column(&format!("Options of `{command}`"));
+        assert_eq!(options(column.iter().map(String::as_str)), there);
+    }
+}
+
+#[test]
+fn suites() {
+    let refusal = Workplace::new().run("bench --suite none -o out").stderr;
+    let names = refusal.split("possible values: ").nth(1).unwrap().split(']').next().unwrap();
+    assert_eq!(first_column("Benchmarks"), names.split(", ").map(|name| format!(" {name} ")).collect());
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! What each command does.
 
+pub(crate) mod bench;
 pub(crate) mod compare;
+mod folder;
 pub(crate) mod info;
 pub(crate) mod render;
 pub(crate) mod scenes;

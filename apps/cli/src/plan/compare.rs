@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use pellucid::Technique;
+use pellucid::{Resolve, Technique};
 
-use super::{SceneName, ViewPlan, option, usage};
+use super::{SceneName, ViewPlan, option, optional, usage};
 use crate::args::{CompareArgs, ReferenceArg, UNSORTED};
 use crate::devices::DevicePlan;
 use crate::values;
@@ -18,6 +18,8 @@ pub(crate) struct ComparePlan {
     pub(crate) compared: Vec<Compared>,
     /// Oracle or CPU; `None` for whichever can do it in seconds.
     pub(crate) reference: Option<Technique>,
+    /// What ordered layers become.
+    pub(crate) resolve: Resolve,
     pub(crate) view: ViewPlan,
     pub(crate) device: DevicePlan,
     pub(crate) quiet: bool,
@@ -43,6 +45,13 @@ impl ComparePlan {
                 compared.push(named);
             }
         }
+        let resolve: Resolve = args.resolve.parse().map_err(|error| usage(format!("{error}")))?;
+        if let Some(named) = compared.iter().find(|named| !named.serves(resolve)) {
+            let name = named.name();
+            return Err(usage(format!(
+                "--techniques: '{name}' does not order fragments, so it serves blend alone, not '{resolve}'"
+            )));
+        }
         let device = DevicePlan::new(&args.device)?;
         device.check("--techniques", &compared.iter().filter_map(|named| named.technique()).collect::<Vec<_>>())?;
         Ok(Self {
@@ -53,8 +62,10 @@ impl ComparePlan {
                 ReferenceArg::Oracle => Technique::Oracle,
                 ReferenceArg::Cpu => Technique::Cpu,
             }),
+            resolve,
             view: ViewPlan {
                 background: option("--background", &args.background, values::color)?,
+                thickness: optional("--thickness", args.thickness.as_ref(), values::length)?,
                 ..ViewPlan::new(&args.view)?
             },
             device,
@@ -69,6 +80,11 @@ impl Compared {
             Self::Unsorted => UNSORTED,
             Self::Technique(technique) => technique.name(),
         }
+    }
+
+    /// Whether it can make such a picture: what does not order fragments blends them, and that is all.
+    pub(crate) fn serves(self, resolve: Resolve) -> bool {
+        resolve == Resolve::Blend || self.technique().is_some_and(Technique::is_exact)
     }
 
     pub(crate) fn technique(self) -> Option<Technique> {

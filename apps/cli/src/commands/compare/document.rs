@@ -1,6 +1,6 @@
 //! What a comparison found, as `compare.json` (described in docs/schema.md), `compare.csv` and a table.
 
-use pellucid::{Scene, View};
+use pellucid::{Resolve, Scene, View};
 use serde::Serialize;
 
 use super::measure::Measured;
@@ -8,7 +8,7 @@ use super::observation::Observation;
 use super::reference::Reference;
 use super::spots::{Spot, spots};
 use crate::report::{SCHEMA, Step};
-use crate::words::{duration, full_count, memory, plural};
+use crate::words::{duration, full_count, memory, plural, table};
 
 #[derive(Serialize)]
 pub(super) struct Document {
@@ -16,6 +16,7 @@ pub(super) struct Document {
     command: &'static str,
     version: &'static str,
     scene: String,
+    resolve: String,
     width: u32,
     height: u32,
     camera: Camera,
@@ -90,9 +91,9 @@ struct Entry {
 
 impl Document {
     pub(super) fn new(
-        name: &str,
-        scene: &Scene,
+        (name, scene): (&str, &Scene),
         view: &View,
+        resolve: Resolve,
         reference: &Reference,
         observation: &Observation,
         measured: &[Measured],
@@ -106,6 +107,7 @@ impl Document {
             command: "compare",
             version: env!("CARGO_PKG_VERSION"),
             scene: name.to_owned(),
+            resolve: resolve.to_string(),
             width: view.width,
             height: view.height,
             camera: Camera { eye: camera.eye.to_array(), target: camera.target.to_array(), up: camera.up.to_array() },
@@ -172,11 +174,11 @@ impl Document {
 
     /// The table on stdout.
     pub(super) fn to_text(&self) -> String {
-        let Self { scene, width, height, reference, .. } = self;
+        let Self { scene, resolve, width, height, reference, .. } = self;
         let fragments = plural(self.fragments, "fragment");
         let deepest = full_count(self.max_depth_complexity.into());
         let mut text = format!(
-            "{scene}: {width} x {height}, {fragments}, at most {deepest} behind a pixel; reference: {}\n\n",
+            "{scene}: {resolve}, {width} x {height}, {fragments}, at most {deepest} behind a pixel; reference: {}\n\n",
             reference.technique
         );
         let heading = [
@@ -192,18 +194,9 @@ impl Document {
             "ambiguous",
             "unexplained",
         ];
-        let rows: Vec<[String; 11]> =
-            [heading.map(str::to_owned)].into_iter().chain(self.techniques.iter().map(Entry::cells)).collect();
-        let widths: [usize; 11] =
-            std::array::from_fn(|i| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0));
-        for row in &rows {
-            let [name, numbers @ ..] = row;
-            text += &format!("{name:0$}", widths[0]);
-            for (number, width) in numbers.iter().zip(&widths[1..]) {
-                text += &format!("  {number:>width$}");
-            }
-            text += "\n";
-        }
+        let mut rows = vec![heading.map(str::to_owned).to_vec()];
+        rows.extend(self.techniques.iter().map(|entry| entry.cells().to_vec()));
+        text += &table(&rows);
         text
     }
 }

@@ -32,15 +32,14 @@ pub(super) struct Measured {
 pub(super) fn measure(
     compared: Compared,
     renderer: &Renderer,
-    scene: &Scene,
-    view: &View,
+    (scene, view, resolve): (&Scene, &View, Resolve),
     reference: &Reference,
     observation: &Observation,
 ) -> Result<Measured, Error> {
     let (image, stats) = match compared {
         Compared::Unsorted => (observation.unsorted.clone(), None),
         Compared::Technique(_) => {
-            let Frame { image, stats } = median(renderer, scene, view)?;
+            let Frame { image, stats } = median(renderer, scene, view, resolve)?;
             (image, Some(stats))
         }
     };
@@ -69,12 +68,12 @@ pub(super) fn measure(
 }
 
 /// The frame of median time. The first one, which also makes what later ones keep, counts only if it is slow.
-fn median(renderer: &Renderer, scene: &Scene, view: &View) -> Result<Frame, Error> {
+fn median(renderer: &Renderer, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
     let start = Instant::now();
-    let first = renderer.render(scene, view, Resolve::Blend)?;
+    let first = renderer.render(scene, view, resolve)?;
     let mut frames = Vec::new();
     while frames.len() < REPEATS && start.elapsed() < PATIENCE {
-        frames.push(renderer.render(scene, view, Resolve::Blend)?);
+        frames.push(renderer.render(scene, view, resolve)?);
     }
     frames.sort_by(|a, b| a.stats.total_ms.total_cmp(&b.stats.total_ms));
     let middle = frames.len() / 2;

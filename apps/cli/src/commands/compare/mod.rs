@@ -4,7 +4,6 @@
 //! figures (`measure`), and what is said of them: `document` as JSON, CSV and text, `report` as a page.
 
 mod document;
-mod folder;
 mod measure;
 mod observation;
 mod pictures;
@@ -13,16 +12,16 @@ mod report;
 mod spots;
 
 use anyhow::Context;
-use pellucid::Technique;
+use pellucid::{Image, Resolve, Technique};
 
 use crate::args::UNSORTED;
+use crate::commands::folder::Folder;
 use crate::commands::{warn_about, warn_about_dropped};
 use crate::plan::{ComparePlan, Compared};
 use crate::progress::Progress;
 use crate::report::to_json;
 use crate::{legend, terminal};
 use document::Document;
-use folder::Folder;
 use measure::{Measured, measure};
 use observation::Observation;
 use reference::Reference;
@@ -39,17 +38,20 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
     }
 
     let named: Vec<Technique> = plan.compared.iter().filter_map(|compared| compared.technique()).collect();
-    let is_usual = |technique| plan.compared.is_empty() && technique != Technique::Oracle;
+    let is_usual = |technique| {
+        let serves = Compared::Technique(technique).serves(plan.resolve);
+        plan.compared.is_empty() && technique != Technique::Oracle && serves
+    };
     let devices = plan.device.open(&named, is_usual)?;
     let mut compared = plan.compared.clone();
     if compared.is_empty() {
-        compared.push(Compared::Unsorted);
+        compared.extend(Some(Compared::Unsorted).filter(|unsorted| unsorted.serves(plan.resolve)));
         compared.extend(devices.techniques.iter().map(|&technique| Compared::Technique(technique)));
     }
 
     let technique = plan.reference.unwrap_or_else(|| reference::usual(scene, &view));
     progress.stage(format!("rendering the reference ({technique})"));
-    let reference = Reference::capture(technique, plan.device.cpu(), scene, &view)?;
+    let reference = Reference::capture(technique, plan.device.cpu(), scene, &view, plan.resolve)?;
     progress.stage("looking at its layers");
     let observation = Observation::of(&reference, scene, &view)?;
 
@@ -61,7 +63,7 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
         if let Compared::Technique(technique) = compared {
             renderer = renderer.technique(technique);
         }
-        let result = measure(compared, &renderer, scene, &view, &reference, &observation);
+        let result = measure(compared, &renderer, (scene, &view, plan.resolve), &reference, &observation);
         let result = result.with_context(|| format!("technique '{}' could not render this view", compared.name()))?;
         folder.save(&format!("{}.png", compared.name()), &result.image)?;
         folder.save(&format!("{}-error.png", compared.name()), &pictures::error_map(&result))?;
@@ -69,16 +71,16 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
     }
 
     progress.stage("writing");
-    // Hardware blending where it was rendered, else its equal.
-    let left = measured.iter().find(|measured| is_unsorted(measured.compared));
-    let (name, unsorted) =
-        left.map_or((UNSORTED, &observation.unsorted), |measured| (measured.compared.name(), &measured.image));
     let exact = reference.technique().name();
-    folder.save("split.png", &pictures::split((unsorted, name), (reference.image(), exact)))?;
+    folder.save(
+        "split.png",
+        &pictures::split(left_of(&measured, &observation, plan.resolve), (reference.image(), exact)),
+    )?;
     folder.save("complexity.png", &pictures::complexity(&observation, legend::FRAGMENTS))?;
     folder.save("layers.png", &observation.layers.strip())?;
 
-    let document = Document::new(&plan.scene.to_string(), scene, &view, &reference, &observation, &measured)?;
+    let document =
+        Document::new((&plan.scene.to_string(), scene), &view, plan.resolve, &reference, &observation, &measured)?;
     let json = to_json(&document)?;
     folder.write("compare.json", json.as_bytes())?;
     folder.write("compare.csv", document.to_csv().as_bytes())?;
@@ -96,6 +98,10 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn is_unsorted(compared: Compared) -> bool {
-    compared.technique().is_some_and(|technique| technique == Technique::Alpha)
+/// What stands on the left of the split picture: hardware blending where it was rendered, else its equal. What is not
+/// blended has nothing unsorted to show; then it is the first technique.
+fn left_of<'a>(measured: &'a [Measured], observation: &'a Observation, resolve: Resolve) -> (&'a Image, &'static str) {
+    let is_alpha = |measured: &&Measured| measured.compared == Compared::Technique(Technique::Alpha);
+    let left = measured.iter().find(is_alpha).or(measured.first().filter(|_| resolve != Resolve::Blend));
+    left.map_or((&observation.unsorted, UNSORTED), |measured| (&measured.image, measured.compared.name()))
 }

@@ -29,14 +29,20 @@ pub(super) fn usual(scene: &Scene, view: &View) -> Technique {
 
 impl Reference {
     /// Renders a view with the oracle, or else with `cpu`.
-    pub(super) fn capture(technique: Technique, cpu: Renderer, scene: &Scene, view: &View) -> anyhow::Result<Self> {
+    pub(super) fn capture(
+        technique: Technique,
+        cpu: Renderer,
+        scene: &Scene,
+        view: &View,
+        resolve: Resolve,
+    ) -> anyhow::Result<Self> {
         if technique == Technique::Oracle {
             let capture = oracle::capture(scene, view).map_err(pellucid::Error::from)?;
-            let (image, stats) = oracle::resolve_capture(&capture, scene, view, Resolve::Blend);
+            let (image, stats) = oracle::resolve_capture(&capture, scene, view, resolve);
             return Ok(Self { image, stats, source: Source::Oracle(capture) });
         }
         let cpu = cpu.technique(Technique::Cpu);
-        let frame = cpu.render(scene, view, Resolve::Blend)?;
+        let frame = cpu.render(scene, view, resolve)?;
         Ok(Self { image: frame.image, stats: frame.stats, source: Source::Cpu(Box::new(cpu)) })
     }
 

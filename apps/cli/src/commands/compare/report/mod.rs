@@ -8,7 +8,7 @@ use pellucid::core::heat_map;
 use serde::Serialize;
 
 use super::document::Document;
-use super::folder::Folder;
+use crate::commands::folder::Folder;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");

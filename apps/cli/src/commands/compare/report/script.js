@@ -46,7 +46,7 @@ const pixelsOf = (name) => {
 const entries = report.techniques;
 const reference = `reference (${report.reference.technique})`;
 $("facts").textContent = [
-  `${report.width} × ${report.height} pixels`, plural(report.triangles, "triangle"), plural(report.fragments, "fragment"),
+  report.resolve, `${report.width} × ${report.height} pixels`, plural(report.triangles, "triangle"), plural(report.fragments, "fragment"),
   ...(report.fragments ? [`at most ${plural(report.max_depth_complexity, "layer")} behind a pixel`] : []), `held against the ${report.reference.technique === "cpu" ? "CPU renderer" : "oracle"}`,
 ].join(" · ");
 for (const entry of entries) {

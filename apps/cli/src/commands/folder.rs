@@ -9,14 +9,14 @@ use pellucid::Image;
 use pellucid::files::{check_writable, write_whole};
 
 /// A folder that can be written to. If it was made for this run and nothing was written, it is gone in the end.
-pub(super) struct Folder {
+pub(crate) struct Folder {
     path: PathBuf,
     is_new: bool,
 }
 
 impl Folder {
     /// The folder of that name, made if only it is missing.
-    pub(super) fn open(path: &Path) -> anyhow::Result<Self> {
+    pub(crate) fn open(path: &Path) -> anyhow::Result<Self> {
         let is_new = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => false,
             Ok(_) => bail!("cannot write into '{}': it is a file, not a folder", path.display()),
@@ -31,19 +31,19 @@ impl Folder {
         Ok(folder)
     }
 
-    pub(super) fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    pub(super) fn save(&self, name: &str, image: &Image) -> anyhow::Result<()> {
+    pub(crate) fn save(&self, name: &str, image: &Image) -> anyhow::Result<()> {
         Ok(pellucid::save(image, self.path(name))?)
     }
 
-    pub(super) fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
+    pub(crate) fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
         Ok(write_whole(&self.path(name), |writer| writer.write_all(content))?)
     }
 
-    pub(super) fn read(&self, name: &str) -> anyhow::Result<Vec<u8>> {
+    pub(crate) fn read(&self, name: &str) -> anyhow::Result<Vec<u8>> {
         let path = self.path(name);
         fs::read(&path).with_context(|| format!("cannot read '{}', just written", path.display()))
     }

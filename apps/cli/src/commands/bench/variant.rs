@@ -1,0 +1,60 @@
+//! A technique with its settings: what is compared at a point.
+
+use pellucid::Technique;
+use pellucid::gpu::Storage;
+
+/// A technique with its settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Variant {
+    pub(super) technique: Technique,
+    /// Of the CPU renderer; `None`: as many as the plan says.
+    pub(super) threads: Option<usize>,
+    /// Of the A-buffer.
+    pub(super) storage: Storage,
+    /// After which peeling stops.
+    pub(super) max_layers: Option<u32>,
+    /// Whether fragments are sorted in a step of their own, rather than where they are read.
+    pub(super) presort: bool,
+}
+
+impl Variant {
+    /// A technique as it usually is.
+    pub(super) fn of(technique: Technique) -> Self {
+        Self { technique, threads: None, storage: Storage::Buffer, max_layers: None, presort: false }
+    }
+
+    pub(super) fn threads(threads: usize) -> Self {
+        Self { threads: Some(threads), ..Self::of(Technique::Cpu) }
+    }
+
+    pub(super) fn in_textures() -> Self {
+        Self { storage: Storage::Texture, ..Self::of(Technique::ABuffer) }
+    }
+
+    /// Peeling that stops after so many layers, exact or not.
+    pub(super) fn layers(max_layers: u32) -> Self {
+        Self { max_layers: Some(max_layers), ..Self::of(Technique::Peel) }
+    }
+
+    /// An LFB that is sorted in a step of its own.
+    pub(super) fn presorted(technique: Technique) -> Self {
+        Self { presort: true, ..Self::of(technique) }
+    }
+
+    pub(super) fn is_on_gpu(self) -> bool {
+        self.technique.backend() == "gpu"
+    }
+
+    /// As in tables: `peel (4 layers)`.
+    pub(super) fn name(self) -> String {
+        let name = self.technique.name();
+        match self {
+            Self { max_layers: Some(layers), .. } => format!("{name} ({layers} layers)"),
+            Self { threads: Some(1), .. } => format!("{name} (1 thread)"),
+            Self { threads: Some(threads), .. } => format!("{name} ({threads} threads)"),
+            Self { presort: true, .. } => format!("{name} (presort)"),
+            Self { storage: Storage::Texture, .. } => format!("{name} (textures)"),
+            _ => name.to_owned(),
+        }
+    }
+}
