@@ -20,6 +20,9 @@ pub enum Error {
     /// A size, opacity or other setting of the view out of range.
     #[error("invalid view: {0}")]
     View(String),
+    /// An F-Buffer of a size that there is not.
+    #[error("invalid F-Buffer: {0}")]
+    FBuffer(String),
     /// Threads that cannot be had.
     #[error("cannot start {threads} threads: {detail}; ask for fewer")]
     Threads {

@@ -14,6 +14,7 @@ pub mod clip;
 pub mod color;
 pub mod composite;
 pub mod error;
+pub mod fbuffer;
 pub mod fragment;
 pub mod heat_map;
 pub mod image;

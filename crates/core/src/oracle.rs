@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use crate::layers::OpaqueSurface;
 use crate::pixel_grid::{Viewport, depth_at, is_near_outline, may_turn_over, twice_signed_area};
-use crate::primitive::{Draw, Fold, NotFinite, Pass, Piece, draws};
+use crate::primitive::{Draw, NotFinite, Pass, Piece, covering_piece, draws};
 use crate::resolve::{PixelResolver, finish};
 use crate::shading::{CornerNormals, NormalPlane, Varying, color_at};
 use crate::stats::Step;
@@ -126,21 +126,6 @@ fn rasterize(
             }
         }
     }
-}
-
-/// The piece by which a primitive covers a pixel: the first one that does, after as many as pieces turned over take off.
-fn covering_piece(pieces: &[Piece], x: i32, y: i32) -> Option<usize> {
-    let mut taken_off = 0;
-    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| piece.triangle.covers(x, y)) {
-        if piece.fold == Fold::TakesOff {
-            taken_off += 1;
-        } else if taken_off > 0 {
-            taken_off -= 1;
-        } else {
-            return Some(number);
-        }
-    }
-    None
 }
 
 /// Whether any two of these fragments lie closer than [`AMBIGUOUS_DEPTH`].

@@ -278,3 +278,18 @@ impl Draw<'_> {
         front || !self.culls_back_faces
     }
 }
+
+/// The piece by which a primitive covers a pixel: the first one that does, after as many as pieces turned over take off.
+pub fn covering_piece(pieces: &[Piece], x: i32, y: i32) -> Option<usize> {
+    let mut taken_off = 0;
+    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| piece.triangle.covers(x, y)) {
+        if piece.fold == Fold::TakesOff {
+            taken_off += 1;
+        } else if taken_off > 0 {
+            taken_off -= 1;
+        } else {
+            return Some(number);
+        }
+    }
+    None
+}

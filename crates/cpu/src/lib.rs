@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 mod bin;
+pub mod fbuffer;
 mod raster;
 mod renderer;
 mod setup;

@@ -1,0 +1,248 @@
+//! The F-Buffer on the CPU: shaders of several passes, each fragment with a slot of its own between them.
+//!
+//! A [`Program`] is a list of passes. Every pass rasterizes the geometry again, in the same order, and finds in a
+//! fragment's slot what the passes before left there; the last one hands its colour to a [`Target`], where tests and
+//! blending are done. What a slot holds is the user's to define: any `Copy` type, such as `[Vec4; 4]` for the four RGBA
+//! targets of the hardware (Houston, Preetham and Segal 2005, section 3.1), or a structure of several of them.
+//!
+//! A fragment that is killed keeps its slot, so that no later pass is led astray.
+
+mod fragment;
+mod ordered;
+mod program;
+mod target;
+
+use std::ops::Range;
+
+use pellucid_core::fbuffer::{Overflow, Place, RasterOrder, Size, Windows};
+
+pub use fragment::Fragment;
+pub use program::{Program, Verdict};
+pub use target::{Output, Target};
+
+use fragment::Shaded;
+
+/// A buffer of slots that hold an `S` each, and whether their fragment was killed.
+#[derive(Debug)]
+pub struct FBuffer<S> {
+    size: Size,
+    slots: Vec<Slot<S>>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Slot<S> {
+    state: S,
+    is_killed: bool,
+}
+
+/// What became of a draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Drawn {
+    /// Windows, or batches, it took.
+    pub windows: u64,
+    /// How often geometry was drawn: each pass of each window.
+    pub submissions: u64,
+    /// Fragments rasterized, each shaded once by every pass until it was killed.
+    pub fragments: u64,
+    /// Fragments that some pass killed.
+    pub killed: u64,
+}
+
+impl<S: Copy + Default> FBuffer<S> {
+    /// A buffer of a size, which is all it will ever hold.
+    pub fn new(size: Size) -> Self {
+        Self { size, slots: vec![Slot::default(); size.slots() as usize] }
+    }
+
+    /// How many slots it has.
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// Bytes it holds.
+    pub fn bytes(&self) -> u64 {
+        (self.slots.capacity() * size_of::<Slot<S>>()) as u64
+    }
+
+    /// What the last window left in a slot of the buffer.
+    ///
+    /// # Panics
+    /// If there is no such slot.
+    pub fn state(&self, slot: u64) -> &S {
+        &self.slots[slot as usize].state
+    }
+
+    /// Draws everything, however much it is: a window slides over the order, and fragments outside of it are discarded
+    /// before they are shaded (the second generation of hardware, section 3.2 and appendix A).
+    ///
+    /// # Panics
+    /// If `target` is not of the picture's size.
+    pub fn draw(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        output: Output,
+        target: &mut Target,
+    ) -> Drawn {
+        let mut drawn = Drawn::default();
+        let mut next = Some(0);
+        while let Some(window) = next {
+            let remaining = self.window(order, program, window, output, target, &mut drawn);
+            next = (remaining > 0).then_some(window + 1);
+        }
+        drawn
+    }
+
+    /// Draws one window, adds to the figures, and returns how many windows remain after it.
+    ///
+    /// # Panics
+    /// If `target` is not of the picture's size.
+    pub fn window(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        window: u64,
+        output: Output,
+        target: &mut Target,
+        drawn: &mut Drawn,
+    ) -> u64 {
+        let windows = Windows::new(order.fragments(), self.size);
+        self.run(order, program, windows.slots(window), output, target, drawn);
+        windows.remaining(window)
+    }
+
+    /// Draws everything if it fits; if not, tells so after the first pass, and nothing reaches the target (the first
+    /// generation of hardware).
+    ///
+    /// # Errors
+    /// [`Overflow`] with the number of fragments that the draw has.
+    ///
+    /// # Panics
+    /// If `target` is not of the picture's size.
+    pub fn query(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        output: Output,
+        target: &mut Target,
+    ) -> Result<Drawn, Overflow> {
+        let (needed, slots) = (order.fragments(), self.size.slots());
+        if needed > slots {
+            // The wasted pass: its fragments beyond the buffer are lost.
+            self.pass(order, program, 0, 0..slots);
+            return Err(Overflow { needed, slots });
+        }
+        let mut drawn = Drawn::default();
+        self.run(order, program, 0..needed, output, target, &mut drawn);
+        Ok(drawn)
+    }
+
+    /// Draws in batches of whole primitives that fit, see [`RasterOrder::batches`].
+    ///
+    /// # Errors
+    /// [`Overflow`] if a primitive alone does not fit; nothing reaches the target.
+    ///
+    /// # Panics
+    /// If `target` is not of the picture's size.
+    pub fn draw_in_batches(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        output: Output,
+        target: &mut Target,
+    ) -> Result<Drawn, Overflow> {
+        let mut drawn = Drawn::default();
+        for batch in order.batches(self.size)? {
+            self.run(order, program, order.slots(batch), output, target, &mut drawn);
+        }
+        Ok(drawn)
+    }
+
+    /// All passes over a range of slots that fits the buffer.
+    fn run(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        slots: Range<u64>,
+        output: Output,
+        target: &mut Target,
+        drawn: &mut Drawn,
+    ) {
+        target.check(order);
+        for pass in 0..program.passes.len() {
+            self.pass(order, program, pass, slots.clone());
+        }
+        let first = slots.start;
+        drawn.windows += 1;
+        drawn.submissions += program.pass_count();
+        drawn.fragments += slots.end - first;
+        rasterize(order, slots, |fragment| {
+            let slot = &self.slots[(fragment.slot - first) as usize];
+            let color = if slot.is_killed { None } else { (program.last)(fragment, &slot.state) };
+            match color {
+                Some(color) => target.write(fragment, color, output),
+                None => drawn.killed += 1,
+            }
+        });
+    }
+
+    /// One pass but the last. The first finds its slots empty.
+    fn pass(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, pass: usize, slots: Range<u64>) {
+        let Some(shade) = program.passes.get(pass) else { return };
+        let first = slots.start;
+        rasterize(order, slots, |fragment| {
+            let slot = &mut self.slots[(fragment.slot - first) as usize];
+            if pass == 0 {
+                *slot = Slot::default();
+            }
+            if !slot.is_killed {
+                slot.is_killed = shade(fragment, &mut slot.state) == Verdict::Kill;
+            }
+        });
+    }
+}
+
+/// The same passes with intermediate results in a framebuffer, one for each pixel: what an F-Buffer is better than. Where
+/// surfaces overlap, every fragment finds what the last drawn one left (figure 1).
+///
+/// # Panics
+/// If `target` is not of the picture's size.
+pub fn draw_through_framebuffer<S: Copy + Default>(
+    order: &RasterOrder<'_>,
+    program: &Program<'_, S>,
+    output: Output,
+    target: &mut Target,
+) {
+    target.check(order);
+    let all = 0..order.fragments();
+    let mut pixels = vec![Slot::<S>::default(); target.depth.len()];
+    let width = target.color.width();
+    let index = |fragment: &Fragment<'_>| (fragment.y * width + fragment.x) as usize;
+    for shade in &program.passes {
+        rasterize(order, all.clone(), |fragment| {
+            let pixel = &mut pixels[index(fragment)];
+            pixel.is_killed = shade(fragment, &mut pixel.state) == Verdict::Kill;
+        });
+    }
+    rasterize(order, all, |fragment| {
+        let pixel = &pixels[index(fragment)];
+        let color = if pixel.is_killed { None } else { (program.last)(fragment, &pixel.state) };
+        if let Some(color) = color {
+            target.write(fragment, color, output);
+        }
+    });
+}
+
+/// Visits the fragments of a window of slots with what it takes to shade them, which a primitive's have in common.
+fn rasterize(order: &RasterOrder<'_>, slots: Range<u64>, mut visit: impl FnMut(&Fragment<'_>)) {
+    let geometry = order.geometry();
+    let mut shaded: Option<(usize, Vec<Shaded>)> = None;
+    order.rasterize(slots, |place: Place| {
+        if shaded.as_ref().is_none_or(|(primitive, _)| *primitive != place.primitive) {
+            shaded = Some((place.primitive, Shaded::of(geometry, &geometry.primitives[place.primitive])));
+        }
+        if let Some((_, pieces)) = &shaded {
+            visit(&Fragment::new(geometry, &place, &pieces[place.piece]));
+        }
+    });
+}
