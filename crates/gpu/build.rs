@@ -1,4 +1,5 @@
-//! Links the shaders: every module under `shaders/technique` and `shaders/pass` becomes one WGSL text.
+//! Links the shaders: every module under `shaders/technique` and `shaders/pass`, and the passes under `shaders/fbuffer`,
+//! become one WGSL text each.
 //!
 //! A pass that imports `package::lfb` is written once for all layered fragment buffers; it is linked once with each
 //! technique that is one, under the name `PASS_TECHNIQUE`. A technique is one if it defines `fragment_count`.
@@ -64,7 +65,9 @@ fn main() {
             continue;
         }
         for (technique, technique_source) in &techniques {
-            if technique_source.contains("fn fragment_count(") {
+            // Not all have to be sorted.
+            let can_sort = technique_source.contains("fn store(") || technique_source.contains("fn store_key(");
+            if technique_source.contains("fn fragment_count(") && (stem != "sort" || can_sort) {
                 // Random access to the fragments of a pixel, which not every structure has.
                 let random_access = technique_source.contains("fn slot_at(");
                 // What is sorted is a reference to a fragment, where it cannot be moved itself.
@@ -74,6 +77,9 @@ fn main() {
                 linked.insert(name, compile(&path("pass", stem), Some(path("technique", technique)), &features));
             }
         }
+    }
+    for stem in ["raster", "shade", "collect", "sort"] {
+        linked.insert(format!("FBUFFER_{}", stem.to_uppercase()), link("fbuffer", stem));
     }
     for words in 1..=4 {
         for (name, folder, stem, read_only) in [

@@ -44,6 +44,8 @@ pub struct Stats {
     pub rerenders: u32,
     /// Pixels with more layers than the frame was allowed to peel: the picture is not exact there.
     pub cut_pixels: u64,
+    /// Windows of slots that an F-Buffer slid over, in all parts of the screen; 0 for other techniques.
+    pub slot_windows: u64,
 }
 
 impl Stats {
@@ -65,6 +67,7 @@ impl Stats {
             windows: 1,
             rerenders: 0,
             cut_pixels: 0,
+            slot_windows: 0,
         }
     }
 

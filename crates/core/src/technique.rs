@@ -24,12 +24,23 @@ pub enum Technique {
     ABuffer,
     /// Linked pages of fragments for each pixel (Crassin 2010, follow-up; LFB chapter, section 20.2).
     Pages,
+    /// A slot for every fragment in rasterization order, sorted into blending order (Houston, Preetham and Segal 2005).
+    FBuffer,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 8] =
-        [Self::Cpu, Self::Oracle, Self::Alpha, Self::Peel, Self::Linear, Self::List, Self::ABuffer, Self::Pages];
+    pub const ALL: [Self; 9] = [
+        Self::Cpu,
+        Self::Oracle,
+        Self::Alpha,
+        Self::Peel,
+        Self::Linear,
+        Self::List,
+        Self::ABuffer,
+        Self::Pages,
+        Self::FBuffer,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -42,6 +53,7 @@ impl Technique {
             Self::List => "list",
             Self::ABuffer => "abuffer",
             Self::Pages => "pages",
+            Self::FBuffer => "fbuffer",
         }
     }
 
@@ -49,14 +61,21 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
-            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages => "gpu",
+            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages | Self::FBuffer => "gpu",
         }
     }
 
     /// Whether it captures every fragment and orders all of them.
     pub fn is_exact(self) -> bool {
         match self {
-            Self::Cpu | Self::Oracle | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages => true,
+            Self::Cpu
+            | Self::Oracle
+            | Self::Peel
+            | Self::Linear
+            | Self::List
+            | Self::ABuffer
+            | Self::Pages
+            | Self::FBuffer => true,
             Self::Alpha => false,
         }
     }
@@ -67,6 +86,7 @@ impl Technique {
             Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer | Self::Pages => "1",
             Self::Peel => "layers + 1",
             Self::Linear => "2",
+            Self::FBuffer => "windows",
         }
     }
 
@@ -81,6 +101,9 @@ impl Technique {
             Self::List => "8 B x pixels + 20 B x fragments",
             Self::ABuffer => "4 B x pixels + 16 B (20 B in textures) x pixels x greatest depth complexity",
             Self::Pages => "8 B x pixels + 68 B x pages of 4 fragments",
+            Self::FBuffer => {
+                "8 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
+            }
         }
     }
 
@@ -94,6 +117,9 @@ impl Technique {
             Self::Linear => "counts fragments, allocates exactly as much, captures and sorts pixel by pixel",
             Self::List => "links the fragments of each pixel, in one pass; repeats it if there was too little room",
             Self::ABuffer => "captures into arrays, one for each pixel, all as long; repeats it if they were too short",
+            Self::FBuffer => {
+                "gives every fragment a slot in rasterization order, then sorts them all into blending order"
+            }
             Self::Pages => {
                 "links pages of fragments of each pixel, in one pass; repeats it if there was too little room"
             }

@@ -1,6 +1,7 @@
 //! One frame in the making: the per-frame half of everything.
 
-use pellucid_core::{Layers, Resolve, View};
+use pellucid_core::fbuffer::Size;
+use pellucid_core::{Layers, Resolve, Scene, View};
 use wgpu::{TextureFormat, TextureUsages, TextureView};
 
 use crate::gpu_data::FrameData;
@@ -70,6 +71,7 @@ pub(crate) enum Goal {
 /// One frame in the making.
 pub(crate) struct Frame<'a> {
     pub(crate) gpu: &'a Context,
+    pub(crate) scene: &'a Scene,
     pub(crate) view: &'a View,
     pub(crate) resolve: Resolve,
     pub(crate) surfaces: Surfaces<'a>,
@@ -87,6 +89,10 @@ pub(crate) struct Frame<'a> {
     pub(crate) presort: bool,
     /// Pixels that had more.
     pub(crate) cut_pixels: u64,
+    /// Largest F-Buffer.
+    pub(crate) fbuffer_size: Option<Size>,
+    /// Windows of slots so far.
+    pub(crate) slot_windows: u64,
     frame_data: wgpu::Buffer,
     encoder: Option<wgpu::CommandEncoder>,
 }
@@ -94,6 +100,7 @@ pub(crate) struct Frame<'a> {
 /// What a frame starts from.
 pub(crate) struct FrameParts<'a> {
     pub(crate) gpu: &'a Context,
+    pub(crate) scene: &'a Scene,
     pub(crate) view: &'a View,
     pub(crate) resolve: Resolve,
     pub(crate) surfaces: Surfaces<'a>,
@@ -106,10 +113,11 @@ pub(crate) struct FrameParts<'a> {
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(parts: FrameParts<'a>) -> Self {
-        let FrameParts { gpu, view, resolve, surfaces, targets, memory, picture, goal, frame_data } = parts;
+        let FrameParts { gpu, scene, view, resolve, surfaces, targets, memory, picture, goal, frame_data } = parts;
         let steps = Steps::new(gpu);
         Self {
             gpu,
+            scene,
             view,
             resolve,
             surfaces,
@@ -122,6 +130,8 @@ impl<'a> Frame<'a> {
             max_layers: None,
             presort: false,
             cut_pixels: 0,
+            fbuffer_size: None,
+            slot_windows: 0,
             frame_data,
             encoder: None,
         }

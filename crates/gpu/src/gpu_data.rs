@@ -98,6 +98,10 @@ pub struct DrawData {
     pub flags: u32,
     /// How its texture is sampled, in bits.
     pub sampling: u32,
+    /// Number of the instance.
+    pub number: u32,
+    /// Ends on a multiple of 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// Bits of [`DrawData::flags`], as in `shaders/shared/mesh.wesl`.
@@ -127,7 +131,7 @@ pub(crate) struct MeshPlaces {
 }
 
 impl DrawData {
-    pub(crate) fn new(draw: &Draw<'_>, places: &MeshPlaces) -> Self {
+    pub(crate) fn new(draw: &Draw<'_>, number: u32, places: &MeshPlaces) -> Self {
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let flags = bit(draw.lit, flags::LIT)
             | bit(draw.mesh.normals().is_some(), flags::HAS_NORMALS)
@@ -157,6 +161,8 @@ impl DrawData {
             colors: places.colors,
             flags,
             sampling,
+            number,
+            padding: [0; 3],
         }
     }
 }

@@ -13,6 +13,7 @@
 
 mod context;
 mod error;
+mod fbuffer;
 mod frame;
 pub mod gpu_data;
 pub mod lfb;

@@ -261,8 +261,8 @@ impl Memory {
     }
 
     /// Gives back buffers that are larger than these need to be, so that all of them fit the budget together. Techniques
-    /// call it with everything a window needs, before they ask for any of it.
-    pub(crate) fn make_room(&mut self, needs: &[(&'static str, u64)]) {
+    /// call it with everything a window needs, before they ask for any of it. Returns whether everything was given back.
+    pub(crate) fn make_room(&mut self, needs: &[(&'static str, u64)]) -> bool {
         let need = |name| needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
         let is_held = |name| self.held().any(|(held, _)| held == name);
         let total: u64 = self
@@ -270,9 +270,11 @@ impl Memory {
             .map(|(name, bytes)| bytes.max(need(name)))
             .chain(needs.iter().filter(|&&(name, _)| !is_held(name)).map(|&(_, bytes)| bytes))
             .sum();
-        if total > self.budget_bytes {
+        let is_too_much = total > self.budget_bytes;
+        if is_too_much {
             self.clear();
         }
+        is_too_much
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use glam::Vec4;
+use pellucid_core::fbuffer::Size;
 use pellucid_core::resolve::finish;
 use pellucid_core::{Image, Layers, Resolve, Scene, Stats, Technique, View};
 use wgpu::BindGroupLayout;
@@ -31,6 +32,7 @@ pub struct GpuRenderer {
     budget_bytes: u64,
     max_layers: Option<u32>,
     presort: bool,
+    fbuffer_size: Option<Size>,
     storage: Storage,
     kept: Mutex<Kept>,
 }
@@ -81,6 +83,7 @@ impl GpuRenderer {
             budget_bytes: DEFAULT_BUDGET_BYTES,
             max_layers: None,
             presort: false,
+            fbuffer_size: None,
             storage: Storage::default(),
             kept: Mutex::new(kept),
         })
@@ -106,6 +109,14 @@ impl GpuRenderer {
     #[must_use]
     pub fn presort(mut self, presort: bool) -> Self {
         self.presort = presort;
+        self
+    }
+
+    /// The same renderer with F-Buffers of a size at most, which slide over the fragments as a window where there are more;
+    /// `None`: as large as fragments and budget make them. The picture is the same at any.
+    #[must_use]
+    pub fn fbuffer_size(mut self, size: Option<Size>) -> Self {
+        self.fbuffer_size = size;
         self
     }
 
@@ -219,9 +230,10 @@ impl GpuRenderer {
         let picture = PictureGroup::new(gpu, &self.picture_layout, targets, &frame_data)?;
         let dropped_triangles = surfaces.dropped_triangles;
         let mut frame =
-            Frame::new(FrameParts { gpu, view, resolve, surfaces, targets, memory, picture, goal, frame_data });
+            Frame::new(FrameParts { gpu, scene, view, resolve, surfaces, targets, memory, picture, goal, frame_data });
         frame.max_layers = self.max_layers;
         frame.presort = self.presort;
+        frame.fbuffer_size = self.fbuffer_size;
 
         let whole = Window { left: 0, top: 0, width: view.width, height: view.height };
         frame.set_window(whole)?;
@@ -259,6 +271,7 @@ impl GpuRenderer {
         stats.windows = windows;
         stats.rerenders = frame.rerenders;
         stats.cut_pixels = frame.cut_pixels;
+        stats.slot_windows = frame.slot_windows;
         stats.peak_bytes = frame.memory.peak_bytes();
         let layers = match std::mem::replace(&mut frame.goal, Goal::Picture) {
             Goal::Picture => Vec::new(),

@@ -101,6 +101,15 @@ struct DrawCommand<'a> {
     shared: Option<(&'a wgpu::Buffer, &'a wgpu::Buffer)>,
 }
 
+/// A draw, for passes in compute over its fragments.
+pub(crate) struct ComputeDraw<'a> {
+    pub(crate) instance: usize,
+    pub(crate) varies: bool,
+    /// Groups 0 and 2.
+    pub(crate) frame_group: &'a BindGroup,
+    pub(crate) texture: &'a BindGroup,
+}
+
 /// What a pass does with surfaces.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfacePass<'a> {
@@ -136,18 +145,18 @@ pub(crate) struct SurfacePipelines {
 impl SurfaceLayouts {
     pub(crate) fn new(gpu: &Context) -> Self {
         let device = &gpu.device;
-        let both = ShaderStages::VERTEX_FRAGMENT;
+        let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
         let uniform = |binding| {
             let ty = BindingType::Buffer {
                 ty: BufferBindingType::Uniform,
                 has_dynamic_offset: false,
                 min_binding_size: None,
             };
-            wgpu::BindGroupLayoutEntry { binding, visibility: both, ty, count: None }
+            wgpu::BindGroupLayoutEntry { binding, visibility: all, ty, count: None }
         };
         let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
             binding,
-            visibility: ShaderStages::FRAGMENT,
+            visibility: ShaderStages::FRAGMENT | ShaderStages::COMPUTE,
             ty: BindingType::Texture {
                 sample_type,
                 view_dimension: wgpu::TextureViewDimension::D2,
@@ -160,9 +169,10 @@ impl SurfaceLayouts {
         };
         let frame = layout(
             "frame and draw",
-            &[uniform(0), uniform(1), texture(2, wgpu::TextureSampleType::Depth), storage_entry(3, both, true)],
+            &[uniform(0), uniform(1), texture(2, wgpu::TextureSampleType::Depth), storage_entry(3, all, true)],
         );
-        let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, ShaderStages::VERTEX, true)));
+        let unshaded = ShaderStages::VERTEX | ShaderStages::COMPUTE;
+        let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, unshaded, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
         let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
         let one_texel = |format| {
@@ -249,7 +259,7 @@ impl<'a> Surfaces<'a> {
                 if may_overflow {
                     dropped_triangles += count_dropped(draw);
                 }
-                let data = DrawData::new(draw, &mesh.places);
+                let data = DrawData::new(draw, i as u32, &mesh.places);
                 bytes[..size_of::<DrawData>()].copy_from_slice(bytemuck::bytes_of(&data));
                 SurfaceDraw {
                     pass: draw.pass,
@@ -270,6 +280,21 @@ impl<'a> Surfaces<'a> {
             .collect();
         gpu.queue.write_buffer(&groups.instances, 0, &bytes);
         Ok(Self { draws: surface_draws, scene: upload, layouts, groups, dropped_triangles })
+    }
+
+    /// Group 1.
+    pub(crate) fn scene_group(&self) -> &BindGroup {
+        &self.scene.bind_group
+    }
+
+    /// All draws of transparent surfaces, in draw order.
+    pub(crate) fn compute_draws(&self) -> impl Iterator<Item = ComputeDraw<'_>> {
+        self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).map(|draw| ComputeDraw {
+            instance: draw.instance,
+            varies: draw.varies,
+            frame_group: &self.groups.transparent[draw.instance],
+            texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
+        })
     }
 
     /// How many draws a part of the frame takes.

@@ -5,7 +5,7 @@
 //! without any. Each class has shaders of its own, dispatched over its list. On the way to the resolve, in "read and blend",
 //! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 256 by heap
 //! sort in a local array; more are sorted in place before, in "sort", in O(n log n) and no memory but the capture's own.
-//! With `presort` all are.
+//! With `presort` all are; of a technique whose fragments come in order, none.
 
 use std::collections::HashMap;
 
@@ -36,7 +36,8 @@ const DISPATCHES: &str = "dispatches";
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LfbShaders {
     pub(crate) classify: &'static str,
-    pub(crate) sort: &'static str,
+    /// None if fragments come in order.
+    pub(crate) sort: Option<&'static str>,
     pub(crate) resolve: &'static str,
     pub(crate) gather: &'static str,
 }
@@ -47,7 +48,7 @@ pub(crate) struct OrderedPasses {
     /// Group 1, lists; and for the making of dispatches group 2.
     buffer: BindGroupLayout,
     prepare: ComputePipeline,
-    sort: ComputePipeline,
+    sort: Option<ComputePipeline>,
     classify_module: ShaderModule,
     resolve_module: ShaderModule,
     layouts: [BindGroupLayout; 2],
@@ -71,11 +72,12 @@ impl OrderedPasses {
         });
         let layouts = [Some(picture_layout), Some(&buffer), None, Some(lfb_layout)];
         let prepare_layouts = [Some(picture_layout), Some(&buffer), Some(&buffer), Some(lfb_layout)];
-        let sort_module = shader(gpu, "sort", shaders.sort);
         let classify_module = shader(gpu, "classify", shaders.classify);
         Self {
             prepare: compute_pipeline(gpu, "classify", &classify_module, "prepare", &prepare_layouts, &[]),
-            sort: compute_pipeline(gpu, "sort", &sort_module, "main", &layouts, &[]),
+            sort: shaders
+                .sort
+                .map(|wgsl| compute_pipeline(gpu, "sort", &shader(gpu, "sort", wgsl), "main", &layouts, &[])),
             classify_module,
             resolve_module: shader(gpu, "read and blend", shaders.resolve),
             layouts: [picture_layout.clone(), lfb_layout.clone()],
@@ -97,7 +99,7 @@ impl OrderedPasses {
         let code = resolve_code(frame.resolve);
         let wants_layers = matches!(frame.goal, Goal::Layers(_));
         let needs_order = wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
-        let sorts_all = wants_layers || frame.presort;
+        let sorts_all = wants_layers || frame.presort || self.sort.is_none();
         let one_class = sorts_all || !needs_order;
 
         let [(_, runs_bytes), (_, dispatches_bytes)] = Self::needs(window.pixels());
@@ -126,10 +128,10 @@ impl OrderedPasses {
 
         let class = |number: u64| number * DISPATCH_BYTES;
         let [few, some, more, many] = [0, 1, 2, 3].map(class);
-        if needs_order {
+        if let Some(sort) = self.sort.as_ref().filter(|_| needs_order) {
             let mut pass = frame.compute_pass("sort")?;
             set_groups(&mut pass, groups);
-            pass.set_pipeline(&self.sort);
+            pass.set_pipeline(sort);
             pass.dispatch_workgroups_indirect(&dispatches, many);
         }
         let mut pass = frame.compute_pass("read and blend")?;

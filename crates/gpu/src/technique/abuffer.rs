@@ -149,7 +149,7 @@ impl ABuffer {
                 shaders::ABUFFER,
                 LfbShaders {
                     classify: shaders::CLASSIFY_ABUFFER,
-                    sort: shaders::SORT_ABUFFER,
+                    sort: Some(shaders::SORT_ABUFFER),
                     resolve: shaders::RESOLVE_ABUFFER,
                     gather: shaders::GATHER_ABUFFER,
                 },
@@ -158,7 +158,7 @@ impl ABuffer {
                 shaders::ABUFFER_TEXTURE,
                 LfbShaders {
                     classify: shaders::CLASSIFY_ABUFFER_TEXTURE,
-                    sort: shaders::SORT_ABUFFER_TEXTURE,
+                    sort: Some(shaders::SORT_ABUFFER_TEXTURE),
                     resolve: shaders::RESOLVE_ABUFFER_TEXTURE,
                     gather: shaders::GATHER_ABUFFER_TEXTURE,
                 },

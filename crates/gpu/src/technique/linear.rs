@@ -53,7 +53,7 @@ impl Linear {
         let pipelines = |pass| SurfacePipelines::new(gpu, layouts.surfaces, &pass);
         let ordered_shaders = LfbShaders {
             classify: shaders::CLASSIFY_LINEAR,
-            sort: shaders::SORT_LINEAR,
+            sort: Some(shaders::SORT_LINEAR),
             resolve: shaders::RESOLVE_LINEAR,
             gather: shaders::GATHER_LINEAR,
         };

@@ -61,7 +61,7 @@ impl List {
         };
         let ordered_shaders = LfbShaders {
             classify: shaders::CLASSIFY_LIST,
-            sort: shaders::SORT_LIST,
+            sort: Some(shaders::SORT_LIST),
             resolve: shaders::RESOLVE_LIST,
             gather: shaders::GATHER_LIST,
         };

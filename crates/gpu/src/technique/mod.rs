@@ -5,6 +5,7 @@
 
 mod abuffer;
 mod alpha;
+mod fbuffer;
 mod growth;
 mod linear;
 mod list;
@@ -57,6 +58,7 @@ pub(crate) fn new(
         Technique::Pages => Ok(Box::new(pages::Pages::new(gpu, layouts))),
         Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts, storage))),
         Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
+        Technique::FBuffer => Ok(Box::new(fbuffer::FBuffer::new(gpu, layouts))),
         Technique::Peel => Ok(Box::new(peel::Peel::new(gpu, layouts))),
         Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
     }

@@ -86,7 +86,7 @@ impl Pages {
         };
         let ordered_shaders = LfbShaders {
             classify: shaders::CLASSIFY_PAGES,
-            sort: shaders::SORT_PAGES,
+            sort: Some(shaders::SORT_PAGES),
             resolve: shaders::RESOLVE_PAGES,
             gather: shaders::GATHER_PAGES,
         };
