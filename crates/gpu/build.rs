@@ -78,7 +78,7 @@ fn main() {
             }
         }
     }
-    for stem in ["raster", "shade", "collect", "sort"] {
+    for stem in ["raster", "shade", "collect", "sort", "output", "module"] {
         linked.insert(format!("FBUFFER_{}", stem.to_uppercase()), link("fbuffer", stem));
     }
     for words in 1..=4 {
@@ -142,7 +142,7 @@ fn compile(root: &ModulePath, lfb: Option<ModulePath>, features: &[(&str, bool)]
     let resolver = LfbResolver { files: FileResolver::new("shaders"), lfb };
     let mut compiler = Wesl::new("shaders").set_custom_resolver(resolver);
     // The one validator that counts is naga's, in the tests. The interface for other people's shaders has no entry point.
-    let keep_root = root.components == ["lfb", "module"];
+    let keep_root = ["lfb", "fbuffer"].map(|folder| [folder, "module"]).iter().any(|module| root.components == module);
     compiler.set_options(CompileOptions { validate: false, keep_root, ..CompileOptions::default() });
     for &(feature, is_on) in features {
         compiler.set_feature(feature, is_on);

@@ -7,13 +7,14 @@
 //! `readback`. `renderer` walks that flow from top to bottom; `frame` is everything that lives as long as one frame.
 //!
 //! What a device has to offer is WebGPU's defaults; see `context` for what is used beyond them where it is there.
-//! `lfb` is apart from that flow: the layered fragment buffer for renderers of other people, on the same shaders.
+//! `lfb` and `fbuffer` are apart from that flow: the layered fragment buffer and shaders of several passes for renderers of
+//! other people, on the same shaders.
 //! Shaders are linked at build time from `shaders/`, by the same names as the modules here.
 #![forbid(unsafe_code)]
 
 mod context;
 mod error;
-mod fbuffer;
+pub mod fbuffer;
 mod frame;
 pub mod gpu_data;
 pub mod lfb;

@@ -137,6 +137,53 @@ impl Windows {
     }
 }
 
+/// What became of a draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Drawn {
+    /// Windows, or batches, it took.
+    pub windows: u64,
+    /// How often geometry was drawn: each pass of each window.
+    pub submissions: u64,
+    /// Fragments rasterized. Each is shaded once by every pass, until one kills it.
+    pub fragments: u64,
+}
+
+impl std::ops::Add for Drawn {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            windows: self.windows + other.windows,
+            submissions: self.submissions + other.submissions,
+            fragments: self.fragments + other.fragments,
+        }
+    }
+}
+
+/// What happens to a fragment after the last pass. The default blends everything and looks at no depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Output {
+    /// Whether fragments behind the target's depth are left out; level with it they are drawn.
+    pub depth_test: bool,
+    /// Whether fragments that are drawn leave their depth.
+    pub depth_write: bool,
+    /// Fragments of an alpha below this are left out.
+    pub alpha_test: Option<f32>,
+    /// Whether colours are blended over what is there, in place of it otherwise.
+    pub blend: bool,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { depth_test: false, depth_write: false, alpha_test: None, blend: true }
+    }
+}
+
+impl Output {
+    /// Nothing is blended, and what is nearest stays.
+    pub const OPAQUE: Self = Self { depth_test: true, depth_write: true, alpha_test: None, blend: false };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,11 +14,12 @@ mod target;
 
 use std::ops::Range;
 
+pub use pellucid_core::fbuffer::{Drawn, Output};
 use pellucid_core::fbuffer::{Overflow, Place, RasterOrder, Size, Windows};
 
 pub use fragment::Fragment;
 pub use program::{Program, Verdict};
-pub use target::{Output, Target};
+pub use target::Target;
 
 use fragment::Shaded;
 
@@ -33,19 +34,6 @@ pub struct FBuffer<S> {
 struct Slot<S> {
     state: S,
     is_killed: bool,
-}
-
-/// What became of a draw.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Drawn {
-    /// Windows, or batches, it took.
-    pub windows: u64,
-    /// How often geometry was drawn: each pass of each window.
-    pub submissions: u64,
-    /// Fragments rasterized, each shaded once by every pass until it was killed.
-    pub fragments: u64,
-    /// Fragments that some pass killed.
-    pub killed: u64,
 }
 
 impl<S: Copy + Default> FBuffer<S> {
@@ -87,13 +75,14 @@ impl<S: Copy + Default> FBuffer<S> {
         let mut drawn = Drawn::default();
         let mut next = Some(0);
         while let Some(window) = next {
-            let remaining = self.window(order, program, window, output, target, &mut drawn);
+            let (remaining, of_window) = self.window(order, program, window, output, target);
+            drawn = drawn + of_window;
             next = (remaining > 0).then_some(window + 1);
         }
         drawn
     }
 
-    /// Draws one window, adds to the figures, and returns how many windows remain after it.
+    /// Draws one window, and returns how many windows remain after it, with the window's figures.
     ///
     /// # Panics
     /// If `target` is not of the picture's size.
@@ -104,11 +93,10 @@ impl<S: Copy + Default> FBuffer<S> {
         window: u64,
         output: Output,
         target: &mut Target,
-        drawn: &mut Drawn,
-    ) -> u64 {
+    ) -> (u64, Drawn) {
         let windows = Windows::new(order.fragments(), self.size);
-        self.run(order, program, windows.slots(window), output, target, drawn);
-        windows.remaining(window)
+        let drawn = self.run(order, program, windows.slots(window), output, target);
+        (windows.remaining(window), drawn)
     }
 
     /// Draws everything if it fits; if not, tells so after the first pass, and nothing reaches the target (the first
@@ -132,9 +120,7 @@ impl<S: Copy + Default> FBuffer<S> {
             self.pass(order, program, 0, 0..slots);
             return Err(Overflow { needed, slots });
         }
-        let mut drawn = Drawn::default();
-        self.run(order, program, 0..needed, output, target, &mut drawn);
-        Ok(drawn)
+        Ok(self.run(order, program, 0..needed, output, target))
     }
 
     /// Draws in batches of whole primitives that fit, see [`RasterOrder::batches`].
@@ -153,7 +139,7 @@ impl<S: Copy + Default> FBuffer<S> {
     ) -> Result<Drawn, Overflow> {
         let mut drawn = Drawn::default();
         for batch in order.batches(self.size)? {
-            self.run(order, program, order.slots(batch), output, target, &mut drawn);
+            drawn = drawn + self.run(order, program, order.slots(batch), output, target);
         }
         Ok(drawn)
     }
@@ -166,24 +152,21 @@ impl<S: Copy + Default> FBuffer<S> {
         slots: Range<u64>,
         output: Output,
         target: &mut Target,
-        drawn: &mut Drawn,
-    ) {
+    ) -> Drawn {
         target.check(order);
         for pass in 0..program.passes.len() {
             self.pass(order, program, pass, slots.clone());
         }
         let first = slots.start;
-        drawn.windows += 1;
-        drawn.submissions += program.pass_count();
-        drawn.fragments += slots.end - first;
+        let drawn = Drawn { windows: 1, submissions: program.pass_count(), fragments: slots.end - first };
         rasterize(order, slots, |fragment| {
             let slot = &self.slots[(fragment.slot - first) as usize];
             let color = if slot.is_killed { None } else { (program.last)(fragment, &slot.state) };
-            match color {
-                Some(color) => target.write(fragment, color, output),
-                None => drawn.killed += 1,
+            if let Some(color) = color {
+                target.write(fragment, color, output);
             }
         });
+        drawn
     }
 
     /// One pass but the last. The first finds its slots empty.

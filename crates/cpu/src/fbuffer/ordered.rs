@@ -26,16 +26,13 @@ impl<S: Copy + Default> FBuffer<S> {
         for window in 0..windows.count() {
             let slots = windows.slots(window);
             let first = slots.start;
-            drawn.windows += 1;
-            drawn.submissions += program.pass_count();
-            drawn.fragments += slots.end - first;
+            drawn = drawn + Drawn { windows: 1, submissions: program.pass_count(), fragments: slots.end - first };
             for pass in 0..program.passes.len() {
                 self.pass(order, program, pass, slots.clone());
             }
             rasterize(order, slots, |fragment| {
                 let slot = &self.slots[(fragment.slot - first) as usize];
                 let color = if slot.is_killed { None } else { (program.last)(fragment, &slot.state) };
-                drawn.killed += u64::from(color.is_none());
                 let pixel = fragment.y * opaque.color.width() + fragment.x;
                 let is_seen = color.is_some() && fragment.depth >= opaque.depth[pixel as usize];
                 keys.push(Key {

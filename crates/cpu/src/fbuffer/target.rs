@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 use pellucid_core::Image;
-use pellucid_core::fbuffer::RasterOrder;
+use pellucid_core::fbuffer::{Output, RasterOrder};
 
 use super::Fragment;
 
@@ -13,30 +13,6 @@ pub struct Target {
     pub color: Image,
     /// Reverse-Z, row by row; 0 is infinitely far.
     pub depth: Vec<f32>,
-}
-
-/// What happens to a fragment after the last pass. The default blends everything and looks at no depth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Output {
-    /// Whether fragments behind the target's depth are left out; level with it they are drawn.
-    pub depth_test: bool,
-    /// Whether fragments that are drawn leave their depth.
-    pub depth_write: bool,
-    /// Fragments of an alpha below this are left out.
-    pub alpha_test: Option<f32>,
-    /// Whether colours are blended over what is there, in place of it otherwise.
-    pub blend: bool,
-}
-
-impl Default for Output {
-    fn default() -> Self {
-        Self { depth_test: false, depth_write: false, alpha_test: None, blend: true }
-    }
-}
-
-impl Output {
-    /// Nothing is blended, and what is nearest stays.
-    pub const OPAQUE: Self = Self { depth_test: true, depth_write: true, alpha_test: None, blend: false };
 }
 
 impl Target {

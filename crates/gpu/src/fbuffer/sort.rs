@@ -4,10 +4,11 @@
 //! there are O(log² n) of them (section 5.1).
 
 use bytemuck::{Pod, Zeroable};
-use pellucid_core::fbuffer::sort::{Stage as NetworkStage, stages};
+use pellucid_core::fbuffer::sort::{Key, Stage as NetworkStage, stages};
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderStages};
 
-use super::dispatch;
+use super::target::read;
+use super::{FBufferError, dispatch};
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, shaders};
@@ -169,4 +170,43 @@ impl Sort {
 /// Bytes from one stage to the next.
 fn stride(gpu: &Context) -> usize {
     size_of::<Stage>().next_multiple_of(gpu.limits.min_storage_buffer_offset_alignment as usize)
+}
+
+/// Sorts keys on a device, in windows of so many, and merges the windows: what the core's `sort` and `merge_runs` do.
+///
+/// # Errors
+/// If they do not fit the device.
+pub fn sort_keys(
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    keys: &[Key],
+    window: u64,
+) -> Result<Vec<Key>, FBufferError> {
+    let (gpu, total) = (Context::adopt(device, queue), keys.len() as u64);
+    let starts = (0..total).step_by(window.max(1) as usize);
+    let mut steps: Vec<Step> =
+        starts.flat_map(|start| sort_steps(&(start..(start + window.max(1)).min(total)))).collect();
+    let merging = merge_steps(total, window.max(1));
+    let sorting = steps.len();
+    steps.extend(merging);
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+    let buffer = |label: &str, bytes: u64| gpu.buffer(label, bytes.max(16).next_multiple_of(4), usage);
+    let mut buffers = [buffer("keys", total * KEY_BYTES)?, buffer("merged keys", total * KEY_BYTES)?];
+    let stages = buffer("stages", Sort::stage_bytes(&gpu, steps.len()))?;
+    gpu.queue.write_buffer(&stages, 0, &Sort::stages(&gpu, &steps));
+    let words: Vec<[u32; 3]> = keys.iter().map(|key| [key.pixel, key.depth, key.slot]).collect();
+    gpu.queue.write_buffer(&buffers[0], 0, bytemuck::cast_slice(&words));
+    let sort = Sort::new(&gpu);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    for (number, step) in steps.iter().enumerate() {
+        let group = sort.group(&gpu, &buffers[0], &buffers[1], &stages);
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        sort.record(&gpu, &mut pass, &group, step, number);
+        if number >= sorting {
+            buffers.swap(0, 1);
+        }
+    }
+    gpu.queue.submit([encoder.finish()]);
+    let words: Vec<[u32; 3]> = read(&gpu, &buffers[0], 0, total)?;
+    Ok(words.into_iter().map(|[pixel, depth, slot]| Key { pixel, depth, slot }).collect())
 }
