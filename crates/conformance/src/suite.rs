@@ -75,6 +75,9 @@ pub const CASES: &[Case] = &[
     usual("@glass:shells=2,sides=12", (23, 17)),
     // No order of whole primitives is right.
     usual("@cyclic", (119, 83)),
+    usual("@fbuffer", (61, 47)),
+    usual("@fbuffer:figure=rainbow", (47, 61)),
+    usual("@fbuffer:figure=sphere,sides=12", (53, 51)),
     // Opaque before, between and behind translucent; alpha-masked leaves; nothing but opaque.
     usual("@spheres:n=24,subdivisions=2", (67, 49)),
     usual("@tree:leaves=100", (17, 23)),

@@ -115,8 +115,10 @@ fn through_a_framebuffer_overlapping_surfaces_lose_their_values() {
 #[test]
 fn kills_masks_and_tests_lead_no_later_pass_astray() {
     let is_killed = |slot: u64| slot % 3 == 0;
+    // Any test that a depth passes in every pass or in none.
+    let is_seen = |depth: f32| depth.to_bits() % 2 == 0;
     let alone =
-        Program::new(|fragment, ()| fragment.color().filter(|_| !is_killed(fragment.slot) && fragment.depth > 0.01));
+        Program::new(|fragment, ()| fragment.color().filter(|_| !is_killed(fragment.slot) && is_seen(fragment.depth)));
     // Each pass writes its channel and leaves the others, two of them end fragments, and all check whose slot it is.
     let program = Program::new(|fragment, slot: &(u64, Vec4)| {
         assert_eq!(slot.0, fragment.slot);
@@ -128,14 +130,15 @@ fn kills_masks_and_tests_lead_no_later_pass_astray() {
         slot.1.x = color.x;
         Verdict::Keep
     })
-    .pass(|fragment, slot| {
+    .pass(move |fragment, slot| {
         assert_eq!(slot.0, fragment.slot);
         slot.1 = fragment.color().unwrap().yzw().extend(0.0).wxyz() + slot.1 * Vec4::X;
-        if fragment.depth > 0.01 { Verdict::Keep } else { Verdict::Kill }
+        if is_seen(fragment.depth) { Verdict::Keep } else { Verdict::Kill }
     });
     let (scene, view) = load("@spheres:n=8,subdivisions=2");
     let order = order(&scene, &view);
     let expected = picture(&order, &view, &alone, Size::square(2048).unwrap());
+    assert!(expected != blank(&view));
     for size in sizes() {
         assert!(picture(&order, &view, &program, size) == expected, "{size}");
     }
@@ -156,6 +159,28 @@ fn windows_take_the_submissions_and_bytes_of_the_formula() {
         let (remaining, first) = fbuffer.window(&order, &three_passes(), 0, Output::default(), &mut blank(&view));
         assert_eq!((remaining, first.submissions), (windows.count() - 1, 3));
     }
+}
+
+/// Figure 3: 23 windows, 69 passes. Figure 4: 162 overflows and 489 submissions at 64 x 64, 10 and 33 at 256 x 256.
+#[test]
+fn spheres_take_the_windows_of_the_papers_figures() {
+    let fragments = |source: &str, size| {
+        let scene = pellucid::load(source).unwrap().scene;
+        order(&scene, &View::of(&scene).size(size, size)).fragments()
+    };
+    let windows = |fragments, side| Windows::new(fragments, Size::square(side).unwrap());
+    let figure_3 = fragments("@fbuffer:figure=sphere", 512);
+    assert_eq!((windows(figure_3, 128).count(), windows(figure_3, 128).submissions(3)), (23, 69), "{figure_3}");
+    for sides in [64, 256] {
+        let figure_4 = fragments(&format!("@fbuffer:figure=sphere,sides={sides},fill=0.636"), 1024);
+        for (side, overflows, submissions) in [(64, 162, 489), (256, 10, 33)] {
+            let windows = windows(figure_4, side);
+            assert_eq!((windows.remaining(0), windows.submissions(3)), (overflows, submissions), "{figure_4}");
+        }
+    }
+    // Figure 2: the first 4096 fragments at 64 x 64, a little more at 128 x 128, all of them from 256 x 256 on.
+    let rainbow = fragments("@fbuffer:figure=rainbow", 512);
+    assert_eq!([64, 128, 256, 512].map(|side| windows(rainbow, side).remaining(0) > 0), [true, true, false, false]);
 }
 
 #[test]

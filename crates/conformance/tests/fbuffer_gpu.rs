@@ -1,14 +1,14 @@
 //! The F-Buffer on the GPU: slots and sort are the CPU's, passes that carry values change no bit, and the technique
 //! `fbuffer` gives the same bits in buffers of any size.
 
-use glam::Vec4;
+use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::fbuffer::order::Geometry;
 use pellucid::core::fbuffer::sort::{Key, merge_runs, sort};
 use pellucid::core::fbuffer::{Drawn, Output, Overflow, RasterOrder, Size, Windows};
 use pellucid::core::primitive::Pass;
 use pellucid::gpu::fbuffer::{Content, FBuffer, FBufferError, sort_keys};
 use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, wgpu};
-use pellucid::{Camera, Image, Renderer, Resolve, Scene, Technique, View};
+use pellucid::{Camera, Image, Instance, Material, Mesh, Projection, Renderer, Resolve, Scene, Technique, View};
 use pellucid_conformance::layers;
 use pellucid_conformance::suite::CASES;
 use proptest::prelude::*;
@@ -151,6 +151,28 @@ fn slots_are_those_of_the_cpu() {
         .unwrap();
 }
 
+/// Where the fill rule alone decides.
+#[test]
+fn slots_of_triangles_between_pixel_centres_are_those_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let corner = (0i8..32, 0i8..32)
+        .prop_map(|(x, y)| Vec3::new(f32::from(2 * x + 1) / 32.0 - 1.0, f32::from(2 * y + 1) / 32.0 - 1.0, 0.0));
+    let config = ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() };
+    TestRunner::new(config)
+        .run(&prop::collection::vec(corner, 3..60), |corners| {
+            let triangles = (0..corners.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let mut scene = Scene::new();
+            let mesh = scene.add_mesh(Mesh::new(corners, triangles).unwrap()).unwrap();
+            let material = scene.add_material(Material::translucent("glass", Vec4::splat(0.5))).unwrap();
+            scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+            let mut view = View::of(&scene).size(32, 32);
+            let projection = Projection::Orthographic { height: 2.0, near: 1.0, far: 3.0 };
+            view.camera = Camera { eye: Vec3::Z * 2.0, target: Vec3::ZERO, up: Vec3::Y, projection };
+            same_slots(&device, &scene, &view, Size::square(64).unwrap())
+        })
+        .unwrap();
+}
+
 #[test]
 fn slots_of_pictures_as_wide_as_can_be_are_those_of_the_cpu() {
     let Some(device) = device() else { return };
@@ -220,7 +242,13 @@ fn kills_and_masks_lead_no_later_pass_astray() {
     let (expected, _) = picture(&mut buffer(&device, Size::square(256).unwrap(), &[]), &scene, &view, &[&one]);
     for size in [Size::row(64).unwrap(), Size::square(32).unwrap(), Size::square(128).unwrap()] {
         let mut fbuffer = buffer(&device, size, &[("a", Content::Targets(1))]);
-        assert!(picture(&mut fbuffer, &scene, &view, &[&first, &second, last]).0 == expected, "{size}");
+        let (image, drawn) = picture(&mut fbuffer, &scene, &view, &[&first, &second, last]);
+        assert!(image == expected, "{size}");
+        if drawn.windows == 1 {
+            let slots = fbuffer.contents(0).unwrap();
+            let killed = slots.chunks_exact(4).take(drawn.fragments as usize).step_by(3);
+            assert!(killed.flatten().all(|&word| word == 0), "no pass sees a fragment that was killed before");
+        }
     }
 }
 

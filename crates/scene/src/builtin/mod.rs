@@ -6,6 +6,7 @@ mod bezier;
 mod blocks;
 mod boxes;
 mod cyclic;
+mod fbuffer;
 mod gallery;
 mod glass;
 mod grids;
@@ -109,6 +110,12 @@ const ALL: &[BuiltIn] = &[
         summary: "Martin Newell's teapot from its Bézier patches, opaque",
         parameters: teapot::PARAMETERS,
         make: teapot::make,
+    },
+    BuiltIn {
+        name: "fbuffer",
+        summary: "what the figures of the F-Buffer paper show: two triangles, one in all colours, a sphere of thin glass",
+        parameters: fbuffer::PARAMETERS,
+        make: fbuffer::make,
     },
 ];
 
