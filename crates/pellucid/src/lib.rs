@@ -16,6 +16,7 @@
 
 mod error;
 pub mod files;
+pub mod multi_pass;
 mod renderer;
 mod save;
 

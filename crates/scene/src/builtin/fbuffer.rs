@@ -62,7 +62,8 @@ fn rainbow() -> Result<Scene, LoadError> {
     Ok(stage.scene)
 }
 
-/// A net of meridians and parallels, twice as many meridians; at the poles, half of a cell's triangles are degenerate.
+/// A net of meridians and parallels about the line of sight, twice as many meridians, from the far pole to the near one: so
+/// the camera sees it drawn back to front. At the poles, half of a cell's triangles are degenerate.
 fn sphere(sides: u32, fill: f32) -> Result<Scene, LoadError> {
     check_triangles("fbuffer", MAX_STORED_TRIANGLES, &[u64::from(sides), u64::from(sides)])?;
     let rows = sides / 2;
@@ -73,7 +74,7 @@ fn sphere(sides: u32, fill: f32) -> Result<Scene, LoadError> {
             let (sin, cos) = sin_cos(f64::from(column % sides) / f64::from(sides));
             // Exactly one point at each pole.
             let radius = if row == 0 || row == rows { 0.0 } else { sin_down };
-            let position = Vec3::new(sin * radius, cos_down, cos * radius);
+            let position = Vec3::new(cos * radius, sin * radius, -cos_down);
             shape.normals.push(position.normalize());
             shape.positions.push(position);
             shape.tex_coords.push(Vec2::new(column as f32 / sides as f32, row as f32 / rows as f32));
@@ -82,7 +83,7 @@ fn sphere(sides: u32, fill: f32) -> Result<Scene, LoadError> {
     let at = |column, row| row * (sides + 1) + column;
     for row in 0..rows {
         for column in 0..sides {
-            let [a, b, c, d] = [at(column, row + 1), at(column + 1, row + 1), at(column + 1, row), at(column, row)];
+            let [a, b, c, d] = [at(column, row), at(column + 1, row), at(column + 1, row + 1), at(column, row + 1)];
             shape.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
