@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
+use pellucid::multi_pass::Shader;
 use pellucid::{Resolve, Technique};
 
 use crate::commands::bench;
@@ -69,6 +70,14 @@ pub(crate) struct RenderArgs {
     /// quarter of the scene's radius]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) thickness: Option<String>,
+
+    #[arg(long, value_name = "NAME", help = shader_help())]
+    pub(crate) shader: Option<String>,
+
+    /// Where the passes of --shader keep intermediate results: one for each fragment, one for each pixel, or both beside
+    /// each other [default: fbuffer]
+    #[arg(long, value_name = "WHERE")]
+    pub(crate) through: Option<ThroughArg>,
 
     /// A turntable: N pictures, FILE-0001.png and so on, the camera going once round its target about the up axis
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
@@ -292,6 +301,11 @@ pub(crate) struct CaptureArgs {
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) layers: Option<String>,
 
+    /// Slots along each side of an F-Buffer (fbuffer, --shader), a power of two from 32 to 2048: it slides over the fragments
+    /// as a window if there are more. The picture is the same at any [default: one slot for each fragment]
+    #[arg(long, value_name = "SIDE", allow_hyphen_values = true)]
+    pub(crate) fbuffer: Option<String>,
+
     /// Write all sorted fragments back before they are resolved (linear, list, pages, abuffer): pays only where they are
     /// read more than once
     #[arg(long)]
@@ -333,6 +347,13 @@ pub(crate) enum StorageArg {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThroughArg {
+    Fbuffer,
+    Framebuffer,
+    Both,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ShadingArg {
     Lit,
     Unlit,
@@ -360,6 +381,14 @@ fn suite_help() -> String {
     let width = bench::SUITES.iter().map(|suite| suite.name.len()).max().unwrap_or(0);
     let suites = bench::SUITES.iter().map(|suite| format!("\n  {:width$}  {}", suite.name, suite.summary));
     format!("What is measured, separated by commas [default: all]:{}", suites.collect::<String>())
+}
+
+fn shader_help() -> String {
+    let width = Shader::NAMES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let names = Shader::NAMES.iter().map(|(name, meaning)| format!("\n  {name:width$}  {meaning}"));
+    let what =
+        "A shader of several passes, on the CPU, blended in draw order; --resolve slots shows its F-Buffer's memory:";
+    what.to_owned() + &names.collect::<String>()
 }
 
 fn compared_names() -> Vec<&'static str> {

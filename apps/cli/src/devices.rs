@@ -1,5 +1,6 @@
 //! Which techniques run here, and the renderer that runs them one after the other.
 
+use pellucid::core::fbuffer::Size;
 use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, Storage};
 use pellucid::{Renderer, Technique};
 
@@ -23,6 +24,7 @@ pub(crate) struct GpuOptions {
     pub(crate) storage: Storage,
     pub(crate) max_layers: Option<u32>,
     pub(crate) presort: bool,
+    pub(crate) fbuffer_size: Option<Size>,
 }
 
 /// A renderer for all of some techniques.
@@ -88,8 +90,9 @@ impl DevicePlan {
                     if let Some(budget_bytes) = self.budget_bytes {
                         gpu = gpu.budget_bytes(budget_bytes);
                     }
-                    let GpuOptions { storage, max_layers, presort } = self.gpu;
-                    renderer = renderer.gpu(gpu.storage(storage).max_layers(max_layers).presort(presort));
+                    let GpuOptions { storage, max_layers, presort, fbuffer_size } = self.gpu;
+                    renderer = renderer
+                        .gpu(gpu.storage(storage).max_layers(max_layers).presort(presort).fbuffer_size(fbuffer_size));
                 }
                 Err(error @ (GpuError::NoAdapter | GpuError::OnlySoftware { .. })) if !asked_for => {
                     techniques.retain(|technique| !on_gpu(technique));

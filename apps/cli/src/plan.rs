@@ -3,6 +3,7 @@
 mod bench;
 mod capture;
 mod compare;
+mod multi_pass;
 mod verify;
 
 use std::ffi::OsString;
@@ -20,6 +21,7 @@ use crate::values;
 pub(crate) use bench::BenchPlan;
 pub(crate) use capture::{CapturePlan, Opened};
 pub(crate) use compare::{ComparePlan, Compared};
+pub(crate) use multi_pass::{MultiPassPlan, Show};
 pub(crate) use verify::VerifyPlan;
 
 /// A picture or turntable to render.
@@ -30,6 +32,8 @@ pub(crate) struct RenderPlan {
     pub(crate) resolve: Resolve,
     pub(crate) view: ViewPlan,
     pub(crate) capture: CapturePlan,
+    /// A shader of several passes in place of resolve and capture.
+    pub(crate) multi_pass: Option<MultiPassPlan>,
     /// Pictures of a turntable; `None` for a single picture.
     pub(crate) frames: Option<u32>,
     pub(crate) stats: Option<StatsTarget>,
@@ -83,6 +87,7 @@ impl RenderPlan {
                 args.output.display()
             )));
         }
+        let multi_pass = MultiPassPlan::new(&args)?;
         let stats = args.stats.map(|path| match path.as_os_str() {
             name if name == "-" => StatsTarget::Stdout,
             _ => StatsTarget::File(path),
@@ -92,14 +97,18 @@ impl RenderPlan {
         }
         Ok(Self {
             scene: SceneName(args.scene),
-            resolve: args.resolve.parse().map_err(|error| usage(format!("{error}")))?,
+            resolve: match &multi_pass {
+                Some(_) => Resolve::Blend,
+                None => args.resolve.parse().map_err(|error| usage(format!("{error}")))?,
+            },
+            multi_pass,
             view: ViewPlan {
                 background: option("--background", &args.background, values::color)?,
                 thickness: optional("--thickness", args.thickness.as_ref(), values::length)?,
                 ..ViewPlan::new(&args.view)?
             },
             frames: optional("--frames", args.frames.as_ref(), |text| values::whole(text, 1, MAX_FRAMES))?,
-            capture: CapturePlan::new(&args.capture)?,
+            capture: CapturePlan::new(&args.capture, multi_pass.is_some())?,
             output: args.output,
             stats,
             quiet: args.quiet,
@@ -112,7 +121,7 @@ impl InfoPlan {
         Ok(Self {
             scene: SceneName(args.scene),
             view: ViewPlan::new(&args.view)?,
-            capture: CapturePlan::new(&args.capture)?,
+            capture: CapturePlan::new(&args.capture, false)?,
             json: args.json,
             quiet: args.quiet,
         })

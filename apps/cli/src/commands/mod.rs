@@ -4,6 +4,7 @@ pub(crate) mod bench;
 pub(crate) mod compare;
 mod folder;
 pub(crate) mod info;
+pub(crate) mod multi_pass;
 pub(crate) mod render;
 pub(crate) mod scenes;
 pub(crate) mod techniques;

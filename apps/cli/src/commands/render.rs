@@ -6,7 +6,7 @@ use anyhow::Context;
 use pellucid::core::heat_map;
 use pellucid::{Camera, Frame, Renderer, Resolve, Scene, Stats, View, files};
 
-use crate::commands::{warn_about, warn_about_cut, warn_about_dropped};
+use crate::commands::{multi_pass, warn_about, warn_about_cut, warn_about_dropped};
 use crate::plan::{Opened, RenderPlan, StatsTarget};
 use crate::progress::Progress;
 use crate::report::{self, Figures, Run};
@@ -29,6 +29,9 @@ pub(crate) fn run(plan: &RenderPlan) -> anyhow::Result<()> {
     let view = plan.view.of(&loaded.scene)?;
     if !plan.quiet {
         progress.suspend(|| warn_about(&loaded.warnings));
+    }
+    if let Some(multi_pass) = &plan.multi_pass {
+        return multi_pass::run(plan, multi_pass, &loaded.scene, &view, &progress);
     }
     let Opened { renderer, misses_gpu } = plan.capture.open()?;
     let job = Job { plan, scene: &loaded.scene, renderer, misses_gpu, progress: &progress };

@@ -3,6 +3,7 @@
 use pellucid::gpu::Storage;
 use pellucid::{Renderer, Technique};
 
+use super::multi_pass::side;
 use super::{optional, usage};
 use crate::args::{CaptureArgs, StorageArg};
 use crate::devices::{DevicePlan, GpuOptions};
@@ -27,19 +28,27 @@ pub(crate) struct Opened {
 const BEST: [Technique; 2] = [Technique::Cpu, Technique::Linear];
 
 impl CapturePlan {
-    pub(super) fn new(args: &CaptureArgs) -> anyhow::Result<Self> {
+    /// `is_multi_pass`: an F-Buffer's size is that of a shader of several passes.
+    pub(super) fn new(args: &CaptureArgs, is_multi_pass: bool) -> anyhow::Result<Self> {
         let technique = args.technique.as_ref().map(|name| name.parse().map_err(|error| usage(format!("{error}"))));
         let technique: Option<Technique> = technique.transpose()?;
         let max_layers = optional("--layers", args.layers.as_ref(), |text| values::whole(text, 1, u32::MAX))?;
         let lists = [Technique::Linear, Technique::List, Technique::ABuffer, Technique::Pages];
         only_for("--layers", max_layers.is_some(), technique, &[Technique::Peel])?;
         only_for("--storage", args.storage.is_some(), technique, &[Technique::ABuffer])?;
+        let fbuffer_size = optional("--fbuffer", args.fbuffer.as_ref(), side)?;
+        only_for("--fbuffer", fbuffer_size.is_some() && !is_multi_pass, technique, &[Technique::FBuffer])?;
         only_for("--presort", args.presort, technique, &lists)?;
         let storage = match args.storage {
             None | Some(StorageArg::Buffer) => Storage::Buffer,
             Some(StorageArg::Texture) => Storage::Texture,
         };
-        let device = DevicePlan::new(&args.device)?.with(GpuOptions { storage, max_layers, presort: args.presort });
+        let device = DevicePlan::new(&args.device)?.with(GpuOptions {
+            storage,
+            max_layers,
+            presort: args.presort,
+            fbuffer_size,
+        });
         device.check("--technique", technique.as_slice())?;
         Ok(Self { technique, device })
     }

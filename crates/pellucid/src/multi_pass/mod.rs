@@ -6,6 +6,7 @@
 
 mod glass;
 
+use std::fmt;
 use std::str::FromStr;
 
 use glam::Vec4;
@@ -40,6 +41,15 @@ impl Shader {
             Self::Lighting => 2,
             Self::PittedGlass => GLASS_PASSES,
         }
+    }
+}
+
+impl fmt::Display for Shader {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Lighting => "lighting",
+            Self::PittedGlass => "pitted-glass",
+        })
     }
 }
 
@@ -119,6 +129,14 @@ pub fn slots(scene: &Scene, view: &View, shader: Shader, size: Size) -> Result<(
         *pixel = color + *pixel * (1.0 - color.w);
     }
     Ok((image, windows))
+}
+
+/// Fragments of the transparent surfaces of a view: how many slots they take.
+///
+/// # Errors
+/// If the view is invalid.
+pub fn fragments(scene: &Scene, view: &View) -> Result<u64, Error> {
+    Ok(order(scene, view)?.fragments())
 }
 
 /// Pixels that differ, by more than an 8-bit picture shows.
