@@ -76,7 +76,7 @@ fn sizes() -> impl Iterator<Item = Size> {
 }
 
 fn buffer((device, queue): &Device, size: Size, contents: &[(&str, Content<'_>)]) -> FBuffer {
-    FBuffer::new(device.clone(), queue.clone(), size, contents).unwrap()
+    FBuffer::new(device, queue, size, contents).unwrap()
 }
 
 fn geometry<'a>(scene: &'a Scene, view: &View) -> Geometry<'a> {
@@ -318,7 +318,7 @@ fn an_overflow_tells_what_is_needed_and_batches_fit() {
 fn misuse_is_told() {
     let Some(device) = device() else { return };
     let size = Size::square(32).unwrap();
-    let new = |name, content| FBuffer::new(device.0.clone(), device.1.clone(), size, &[(name, content)]);
+    let new = |name, content| FBuffer::new(&device.0, &device.1, size, &[(name, content)]);
     for (name, content) in [("a b", Content::Targets(1)), ("a", Content::Targets(0)), ("a", Content::Targets(5))] {
         assert!(matches!(new(name, content), Err(FBufferError::Buffer { .. })), "{name} {content:?}");
     }
@@ -346,7 +346,7 @@ fn the_sort_is_stable_and_right() {
             let mut expected = keys.clone();
             expected.sort_by_key(|key| (key.pixel, key.depth));
             for window in [u64::from(length), 1000] {
-                let sorted = sort_keys(device.clone(), queue.clone(), &keys, window).unwrap();
+                let sorted = sort_keys(&device, &queue, &keys, window).unwrap();
                 assert!(sorted == expected, "{length} keys of {pixels} pixels in windows of {window}");
             }
             let mut on_cpu = keys;

@@ -64,7 +64,5 @@ impl MultiPassPlan {
 pub(super) fn side(text: &str) -> Result<Size, values::Wrong> {
     let [least, greatest] = SIDES;
     let size = values::whole(text, least, greatest).ok().and_then(|side| Size::square(side).ok());
-    size.ok_or_else(|| {
-        format!("not the side of an F-Buffer; it must be a power of two from {least} to {greatest}").into()
-    })
+    size.ok_or_else(|| format!("not the side of an F-Buffer; it must be a power of two from {least} to {greatest}"))
 }

@@ -82,13 +82,13 @@ impl<'a> Fragment<'a> {
 
     /// The colour that the lighting model gives it: linear light, premultiplied; `None` where its alpha test fails.
     pub fn color(&self) -> Option<Vec4> {
-        let [x, y] = self.from_anchor();
+        let [x, y] = self.offset_px();
         color_at(self.draw, &self.shaded.normal, self.shaded.varying.as_ref(), x, y)
     }
 
     /// Weights of its triangle's three vertices, perspective-correct.
     pub fn weights(&self) -> Vec3 {
-        let [x, y] = self.from_anchor();
+        let [x, y] = self.offset_px();
         let [second, third] = self.shaded.weights.map(|plane| plane.at(x, y));
         let inv_w = self.shaded.piece.triangle.vertices.map(|vertex| f64::from(vertex.inv_w));
         let [a, b, c] = [(1.0 - second - third) * inv_w[0], second * inv_w[1], third * inv_w[2]];
@@ -112,7 +112,8 @@ impl<'a> Fragment<'a> {
         self.draw.mesh.triangles()[self.triangle].map(|vertex| vertex as usize)
     }
 
-    fn from_anchor(&self) -> [i32; 2] {
+    /// Pixels from the anchor of its piece's planes.
+    fn offset_px(&self) -> [i32; 2] {
         let [left, top] = self.shaded.piece.triangle.anchor_px();
         [self.x as i32 - left, self.y as i32 - top]
     }

@@ -49,12 +49,12 @@ impl FBuffer {
     /// # Errors
     /// [`FBufferError::Buffer`], or if it does not fit the device.
     pub fn new(
-        device: wgpu::Device,
-        queue: wgpu::Queue,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
         size: Size,
         contents: &[(&str, Content<'_>)],
     ) -> Result<Self, FBufferError> {
-        let gpu = Context::adopt(device, queue);
+        let gpu = Context::adopt(device.clone(), queue.clone());
         for (name, content) in contents {
             content.check(name)?;
         }

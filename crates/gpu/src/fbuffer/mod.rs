@@ -16,7 +16,7 @@
 //! use pellucid_core::{Scene, View, primitive::Pass};
 //! use pellucid_gpu::fbuffer::{Content, FBuffer, FBufferError};
 //! # use glam::Vec4;
-//! # fn f(device: wgpu::Device, queue: wgpu::Queue, scene: &Scene, view: &View) -> Result<(), FBufferError> {
+//! # fn f(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene, view: &View) -> Result<(), FBufferError> {
 //! let mut fbuffer = FBuffer::new(device, queue, Size::square(128)?, &[("light", Content::Targets(1))])?;
 //! let program = fbuffer.program(
 //!     &[

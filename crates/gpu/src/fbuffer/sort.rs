@@ -177,12 +177,12 @@ fn stride(gpu: &Context) -> usize {
 /// # Errors
 /// If they do not fit the device.
 pub fn sort_keys(
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
     keys: &[Key],
     window: u64,
 ) -> Result<Vec<Key>, FBufferError> {
-    let (gpu, total) = (Context::adopt(device, queue), keys.len() as u64);
+    let (gpu, total) = (Context::adopt(device.clone(), queue.clone()), keys.len() as u64);
     let starts = (0..total).step_by(window.max(1) as usize);
     let mut steps: Vec<Step> =
         starts.flat_map(|start| sort_steps(&(start..(start + window.max(1)).min(total)))).collect();
