@@ -114,9 +114,9 @@ fn through_a_framebuffer_overlapping_surfaces_lose_their_values() {
 
 #[test]
 fn kills_masks_and_tests_lead_no_later_pass_astray() {
-    let is_killed = |slot: u64| slot % 3 == 0;
+    let is_killed = |slot: u64| slot.is_multiple_of(3);
     // Any test that a depth passes in every pass or in none.
-    let is_seen = |depth: f32| depth.to_bits() % 2 == 0;
+    let is_seen = |depth: f32| depth.to_bits().is_multiple_of(2);
     let alone =
         Program::new(|fragment, ()| fragment.color().filter(|_| !is_killed(fragment.slot) && is_seen(fragment.depth)));
     // Each pass writes its channel and leaves the others, two of them end fragments, and all check whose slot it is.

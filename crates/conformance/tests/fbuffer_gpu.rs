@@ -145,7 +145,7 @@ fn slots_are_those_of_the_cpu() {
     TestRunner::new(config)
         .run(&strategy, |(scene, camera, width, height): (Scene, Camera, u32, u32)| {
             let view = View { camera, ..View::of(&scene).size(width, height).opacity(0.5) };
-            let size = if width % 2 == 0 { Size::square(32) } else { Size::square(256) };
+            let size = if width.is_multiple_of(2) { Size::square(32) } else { Size::square(256) };
             same_slots(&device, &scene, &view, size.unwrap())
         })
         .unwrap();
