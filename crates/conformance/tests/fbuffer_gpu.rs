@@ -356,3 +356,27 @@ fn the_sort_is_stable_and_right() {
         }
     }
 }
+
+#[test]
+fn the_technique_holds_what_its_formula_says() {
+    let scene = pellucid::load("@fbuffer:figure=sphere,sides=16").unwrap().scene;
+    let view = View::of(&scene).size(90, 70);
+    let geometry = geometry(&scene, &view);
+    assert!(geometry.primitives.iter().all(|primitive| primitive.piece_count == 1), "nothing is clipped");
+    let rows: i32 = geometry.primitives.iter().map(|p| p.bounds.bottom - p.bounds.top + 1).sum();
+    for size in [Size::square(32).unwrap(), Size::square(256).unwrap()] {
+        let Some(gpu) = gpu(false) else { return };
+        let renderer = Renderer::new().gpu(gpu.fbuffer_size(Some(size))).technique(Technique::FBuffer);
+        let stats = renderer.render(&scene, &view, Resolve::Blend).unwrap().stats;
+        let (triangles, rows) = (geometry.primitives.len() as u64, rows as u64);
+        let merges = stats.fragments > size.slots();
+        let formula = 8 * 90 * 70
+            + 80 * triangles
+            + 20 * rows
+            + (if merges { 40 } else { 28 }) * stats.fragments
+            + 32 * size.slots().min(stats.fragments);
+        // Headers, sums of sums, and the parameters of each step of the sort.
+        let rest = stats.peak_bytes.checked_sub(formula).expect("no less than the formula");
+        assert!(rest < 300 * 256, "{rest} bytes more than {formula} in {size}");
+    }
+}
