@@ -254,7 +254,7 @@ proptest! {
         let order = order(&scene, &view);
         let opaque = opaque(&scene, &view);
         for size in [Size::row(32).unwrap(), Size::square(32).unwrap(), Size::square(256).unwrap()] {
-            let (layers, drawn) = FBuffer::new(size).layers(&order, &three_passes(), &opaque);
+            let (layers, drawn) = FBuffer::new(size).layers(&order, &three_passes(), &opaque).unwrap();
             if let Some(difference) = first_difference(&capture.layers, &layers) {
                 return Err(TestCaseError::fail(format!("{size}: {difference}")));
             }

@@ -13,9 +13,10 @@ fn the_example_gives_the_same_bits_in_any_buffer() {
     }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
+    let (scene, view) = pitted_glass::scene([96, 80]).unwrap();
     let render = |side| {
         let (device, queue) = pollster::block_on(adapter.request_device(&Default::default())).unwrap();
-        pitted_glass::render(&device, &queue, [96, 80], side).unwrap()
+        pitted_glass::render(&device, &queue, (&scene, &view), side).unwrap()
     };
     let (expected, drawn) = render(256);
     assert_eq!((drawn.windows, drawn.submissions), (1, 3));

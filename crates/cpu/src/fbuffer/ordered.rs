@@ -3,7 +3,7 @@
 
 use glam::Vec4;
 use pellucid_core::fbuffer::sort::{Key, merge_runs, sort};
-use pellucid_core::fbuffer::{RasterOrder, Windows};
+use pellucid_core::fbuffer::{Overflow, RasterOrder, Windows};
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::{Fragment, Layers};
 
@@ -15,11 +15,20 @@ impl<S: Copy + Default> FBuffer<S> {
     ///
     /// Layers hold all fragments of the draw, unlike the buffer itself.
     ///
+    /// # Errors
+    /// [`Overflow`] if keys cannot number that many fragments: 2^32 or more.
+    ///
     /// # Panics
-    /// If `opaque` is not of the picture's size, or the draw has 2^32 fragments or more.
-    pub fn layers(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, opaque: &Target) -> (Layers, Drawn) {
+    /// If `opaque` is not of the picture's size.
+    pub fn layers(
+        &mut self,
+        order: &RasterOrder<'_>,
+        program: &Program<'_, S>,
+        opaque: &Target,
+    ) -> Result<(Layers, Drawn), Overflow> {
         opaque.check(order);
-        let total = u32::try_from(order.fragments()).expect("fewer than 2^32 fragments");
+        let (needed, slots) = (order.fragments(), u64::from(u32::MAX));
+        let total = u32::try_from(needed).map_err(|_| Overflow { needed, slots })?;
         let windows = Windows::new(order.fragments(), self.size());
         let (mut keys, mut fragments) = (Vec::with_capacity(total as usize), Vec::with_capacity(total as usize));
         let mut drawn = Drawn::default();
@@ -46,7 +55,7 @@ impl<S: Copy + Default> FBuffer<S> {
             sort(&mut keys[first as usize..]);
         }
         merge_runs(&mut keys, self.size().slots() as usize);
-        (gather(&keys, &fragments, opaque), drawn)
+        Ok((gather(&keys, &fragments, opaque), drawn))
     }
 }
 

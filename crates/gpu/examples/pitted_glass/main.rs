@@ -24,7 +24,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }))?;
     // Default limits, no features: what every WebGPU device has.
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
-    let (picture, drawn) = render::render(&device, &queue, SIZE, SIDE)?;
+    let (scene, view) = render::scene(SIZE)?;
+    let (picture, drawn) = render::render(&device, &queue, (&scene, &view), SIDE)?;
     println!(
         "{} fragments in {} windows of {SIDE} x {SIDE} slots: geometry drawn {} times",
         drawn.fragments, drawn.windows, drawn.submissions
