@@ -3,7 +3,7 @@
 //!
 //! Step "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs, and finishes those
 //! without any. Each class has shaders of its own, dispatched over its list. On the way to the resolve, in "read and blend",
-//! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 256 by heap
+//! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 64 by heap
 //! sort in a local array; more are sorted in place before, in "sort", in O(n log n) and no memory but the capture's own.
 //! With `presort` all are; of a technique whose fragments come in order, none.
 

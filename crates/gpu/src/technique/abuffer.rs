@@ -94,7 +94,6 @@ impl Storage {
     /// Everything for so many pixels and layers. Textures are told one by one, as each is its own thing to the limits.
     fn needs(self, gpu: &Context, pixels: u64, layers: u64) -> Vec<(&'static str, u64)> {
         let mut needs = vec![(COUNTS, (pixels + 1) * 4)];
-        needs.extend(OrderedPasses::needs(pixels));
         match self {
             Self::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
             Self::Texture => {
@@ -104,6 +103,7 @@ impl Storage {
                 needs.extend((0..shape.array_layers).map(|_| (LAYERS, texture_bytes)));
             }
         }
+        needs.extend(OrderedPasses::needs(pixels));
         needs
     }
 
