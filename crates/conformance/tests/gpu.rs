@@ -3,7 +3,7 @@
 mod common;
 
 use pellucid::core::oracle;
-use pellucid::gpu::GpuError;
+use pellucid::gpu::{GpuError, GpuRenderer};
 use pellucid::{Error, Renderer, Resolve, Technique, View};
 use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
 
@@ -23,53 +23,57 @@ fn exact_techniques_agree_with_the_oracle() {
         for technique in techniques() {
             let Some(gpu) = gpu(floor) else { return };
             let what = format!("{technique}{}", if floor { " on the floor" } else { "" });
-            candidates.push((what, Candidate::new(technique, Renderer::new().gpu(gpu))));
+            candidates.push((what, technique, Candidate::new(technique, Renderer::new().gpu(gpu))));
         }
     }
     let mut failures = Vec::new();
     for case in CASES {
-        let start = std::time::Instant::now();
         let prepared = case.prepare().unwrap();
-        let prep = start.elapsed();
-        for (what, candidate) in &candidates {
+        for (what, technique, candidate) in &candidates {
             for check in Check::ALL {
+                // A thousand passes over a thousand planes for every picture: fewer of them.
+                let is_long = *technique == Technique::Peel && case.source == "@planes:n=1000";
+                if is_long && !matches!(check, Check::Layers | Check::Picture(Resolve::Gelly)) {
+                    continue;
+                }
                 let comparison = prepared.run(check, candidate).unwrap_or_else(|error| panic!("{case:?}: {error}"));
                 if !comparison.passes() {
                     failures.push(format!("{what}, {case:?}, {check}: {comparison:?}"));
-                    println!("{what}, {case:?}, {check}: {comparison:?}");
                 }
             }
         }
-        println!("{case:?} {prep:?} of {:?}", start.elapsed());
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 #[test]
 fn bits_depend_on_neither_budget_nor_repetition() {
-    let cases = ["@planes:n=40", "@hairball:strands=60", "@gallery"];
+    let Some(mut device) = gpu(false) else { return };
     for technique in techniques() {
-        for source in cases {
-            // A device of its own: what an earlier frame left behind would count as held.
-            let Some(device) = gpu(false) else { return };
-            let renderer = Renderer::new().gpu(device).technique(technique);
+        // Few triangles: peeling draws all of them three times for each layer of each window.
+        for source in ["@planes:n=12", "@hairball:strands=24,segments=6", "@boxes:n=3"] {
             let scene = pellucid::load(source).unwrap().scene;
-            let view = View::of(&scene).size(97, 65).opacity(0.8);
-            // The first frame still holds what the scene before took.
-            renderer.render(&scene, &view, Resolve::Blend).unwrap();
-            let whole = renderer.render(&scene, &view, Resolve::Blend).unwrap();
-            assert_eq!(whole.stats.windows, 1);
+            let view = View::of(&scene).size(61, 43).opacity(0.8);
+            device = device.budget_bytes(1 << 30);
+            let render = |device: &GpuRenderer| device.render(&scene, &view, Resolve::Blend, technique).unwrap();
+            let first = render(&device);
+            assert_eq!(first.stats.windows, 1);
+            let mut whole = first.clone();
             for _ in 0..20 {
-                let again = renderer.render(&scene, &view, Resolve::Blend).unwrap();
-                assert!(again.image == whole.image, "{technique}, {source}: another picture the second time");
+                whole = render(&device);
+                assert!(whole.image == first.image, "{technique}, {source}: another picture the second time");
             }
+            // By now it holds what it needs, and nothing that was guessed or left behind.
+            let needed_bytes = whole.stats.peak_bytes;
             for parts in [2, 4, 16, 64] {
-                let budget_bytes = whole.stats.peak_bytes / parts;
-                let limited = Renderer::new().gpu(gpu(false).unwrap().budget_bytes(budget_bytes)).technique(technique);
-                let frame = limited.render(&scene, &view, Resolve::Blend).unwrap();
+                // A single pixel may take so much.
+                let budget_bytes = (needed_bytes / parts).max(8192);
+                device = device.budget_bytes(budget_bytes);
+                let frame = render(&device);
                 assert!(frame.image == whole.image, "{technique}, {source}: another picture at 1/{parts}");
                 assert!(frame.stats.peak_bytes <= budget_bytes, "{technique}, {source}: {:?}", frame.stats);
-                assert!(u64::from(frame.stats.windows) >= parts, "{technique}, {source}: {:?}", frame.stats);
+                // Not as many as parts: an A-buffer's windows are as deep as their own deepest pixel alone.
+                assert!(frame.stats.windows > 1, "{technique}, {source}: {:?}", frame.stats);
                 assert_eq!(frame.stats.fragments, whole.stats.fragments);
             }
         }

@@ -5,7 +5,8 @@
 //! without any. Each class has shaders of its own, dispatched over its list. On the way to the resolve, in "read and blend",
 //! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 64 by heap
 //! sort in a local array; more are sorted in place before, in "sort", in O(n log n) and no memory but the capture's own.
-//! With `presort` all are; of a technique whose fragments come in order, none.
+//! The array of references is no longer as llvmpipe takes 8 s to compile one of 256, and 0.8 s for 64. With `presort` all are
+//! sorted in place; of a technique whose fragments come in order, none.
 
 use std::collections::HashMap;
 
