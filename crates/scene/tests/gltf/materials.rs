@@ -57,7 +57,8 @@ fn alpha_modes() {
     let mut doc = textured(json!({"alphaMode": "mask"}));
     assert!(doc.error().contains("material 0: unknown alpha mode 'mask'"), "{}", doc.error());
     doc.json["materials"][0] = json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1e99]}});
-    assert!(doc.error().contains("material 0"), "{}", doc.error());
+    // The parser itself may find that an f32 cannot be so large.
+    assert!(["material 0", "number out of range"].iter().any(|says| doc.error().contains(says)), "{}", doc.error());
 }
 
 #[test]
