@@ -198,18 +198,21 @@ pub fn draw_through_framebuffer<S: Copy + Default>(
 ) {
     target.check(order);
     let all = 0..order.fragments();
-    let mut pixels = vec![Slot::<S>::default(); target.depth.len()];
+    // The state, and the pass that killed it.
+    let mut pixels = vec![(S::default(), None); target.depth.len()];
     let width = target.color.width();
     let index = |fragment: &Fragment<'_>| (fragment.y * width + fragment.x) as usize;
-    for shade in &program.passes {
+    for (number, shade) in program.passes.iter().enumerate() {
         rasterize(order, all.clone(), |fragment| {
-            let pixel = &mut pixels[index(fragment)];
-            pixel.is_killed = shade(fragment, &mut pixel.state) == Verdict::Kill;
+            let (state, killed_by) = &mut pixels[index(fragment)];
+            if killed_by.is_none_or(|pass| pass == number) {
+                *killed_by = (shade(fragment, state) == Verdict::Kill).then_some(number);
+            }
         });
     }
     rasterize(order, all, |fragment| {
-        let pixel = &pixels[index(fragment)];
-        let color = if pixel.is_killed { None } else { (program.last)(fragment, &pixel.state) };
+        let (state, killed_by) = &pixels[index(fragment)];
+        let color = if killed_by.is_some() { None } else { (program.last)(fragment, state) };
         if let Some(color) = color {
             target.write(fragment, color, output);
         }
