@@ -9,8 +9,12 @@ use pellucid::gpu::fbuffer::{Content, FBuffer, FBufferError, Framebuffer};
 use pellucid::gpu::{Context, ContextOptions, wgpu};
 use pellucid::multi_pass::{self, GpuMultiPass, Shader, Through, differing_pixels};
 use pellucid::{Image, Scene, View};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 
 mod common;
+#[path = "common/soup.rs"]
+mod soup;
 
 /// A device of somebody else, on WebGPU's default limits. Its errors panic.
 fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
@@ -55,11 +59,7 @@ const CONTENTS: [(&str, Content<'_>); 2] = [
     ("a", Content::Targets(2)),
     (
         "b",
-        Content::State {
-            name: "Carried",
-            declaration: "struct Carried { mark: u32, color: vec4<f32> }",
-            stride: 32,
-        },
+        Content::State { name: "Carried", declaration: "struct Carried { mark: u32, color: vec4<f32> }", stride: 32 },
     ),
 ];
 
@@ -130,6 +130,33 @@ fn a_framebuffer_is_wrong_where_surfaces_overlap_and_as_wrong_as_on_the_cpu() {
     }
 }
 
+/// Of any scene, what was drawn last is what the CPU drew last.
+#[test]
+fn the_last_drawn_fragment_of_random_soups_is_that_of_the_cpu() {
+    let Some((device, queue)) = device() else { return };
+    let size = [53, 41];
+    let window = Size::square(32).unwrap();
+    let mut framebuffer = Framebuffer::new(&device, &queue, size, window, &CONTENTS).unwrap();
+    let on_gpu = framebuffer.program(&PASSES, [None; 3]).unwrap();
+    // Blending would add up what is rounded differently.
+    let output = Output { blend: false, ..Output::default() };
+    let config = ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() };
+    let strategy = (soup::soup(), soup::camera());
+    TestRunner::new(config)
+        .run(&strategy, |(scene, camera)| {
+            let view = View { camera, ..View::of(&scene).size(size[0], size[1]).opacity(0.5) };
+            let mut expected = Target::new(size[0], size[1], GROUND);
+            let order = RasterOrder::new(geometry(&scene, &view));
+            draw_through_framebuffer(&order, &program(), output, &mut expected);
+            let drawing = framebuffer.drawing(geometry(&scene, &view)).unwrap();
+            let target = framebuffer.target(GROUND).unwrap();
+            framebuffer.draw(&drawing, &on_gpu, [None; 3], output, &target).unwrap();
+            prop_assert!(framebuffer.read(&target).unwrap() == expected.color);
+            Ok(())
+        })
+        .unwrap();
+}
+
 #[test]
 fn what_is_for_the_other_kind_of_buffer_is_told() {
     let Some((device, queue)) = device() else { return };
@@ -137,8 +164,7 @@ fn what_is_for_the_other_kind_of_buffer_is_told() {
     let size = Size::square(128).unwrap();
     let mut fbuffer = FBuffer::new(&device, &queue, size, &CONTENTS).unwrap();
     let mut framebuffer = Framebuffer::new(&device, &queue, [61, 47], size, &CONTENTS).unwrap();
-    let programs =
-        [fbuffer.program(&PASSES, [None; 3]).unwrap(), framebuffer.program(&PASSES, [None; 3]).unwrap()];
+    let programs = [fbuffer.program(&PASSES, [None; 3]).unwrap(), framebuffer.program(&PASSES, [None; 3]).unwrap()];
     let drawings =
         [fbuffer.drawing(geometry(&scene, &view)).unwrap(), framebuffer.drawing(geometry(&scene, &view)).unwrap()];
     let target = framebuffer.target(GROUND).unwrap();

@@ -27,6 +27,7 @@ use fragment::Shaded;
 #[derive(Debug)]
 pub struct FBuffer<S> {
     size: Size,
+    /// Those that the window has, within the room there is: first in, first out.
     slots: Vec<Slot<S>>,
 }
 
@@ -39,7 +40,7 @@ struct Slot<S> {
 impl<S: Copy + Default> FBuffer<S> {
     /// A buffer of a size, which is all it will ever hold.
     pub fn new(size: Size) -> Self {
-        Self { size, slots: vec![Slot::default(); size.slots() as usize] }
+        Self { size, slots: Vec::with_capacity(size.slots() as usize) }
     }
 
     /// How many slots it has.
@@ -55,7 +56,7 @@ impl<S: Copy + Default> FBuffer<S> {
     /// What the last window left in a slot of the buffer.
     ///
     /// # Panics
-    /// If there is no such slot.
+    /// If no fragment had such a slot.
     pub fn state(&self, slot: u64) -> &S {
         &self.slots[slot as usize].state
     }
@@ -154,9 +155,7 @@ impl<S: Copy + Default> FBuffer<S> {
         target: &mut Target,
     ) -> Drawn {
         target.check(order);
-        for pass in 0..program.passes.len() {
-            self.pass(order, program, pass, slots.clone());
-        }
+        self.passes(order, program, slots.clone());
         let first = slots.start;
         let drawn = Drawn { windows: 1, submissions: program.pass_count(), fragments: slots.end - first };
         rasterize(order, slots, |fragment| {
@@ -169,15 +168,29 @@ impl<S: Copy + Default> FBuffer<S> {
         drawn
     }
 
+    /// All passes but the last.
+    fn passes(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, slots: Range<u64>) {
+        // A shader of one pass finds its slots empty.
+        self.slots.clear();
+        self.slots
+            .resize(if program.passes.is_empty() { slots.end - slots.start } else { 0 } as usize, Slot::default());
+        for pass in 0..program.passes.len() {
+            self.pass(order, program, pass, slots.clone());
+        }
+    }
+
     /// One pass but the last. The first finds its slots empty.
     fn pass(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, pass: usize, slots: Range<u64>) {
         let Some(shade) = program.passes.get(pass) else { return };
         let first = slots.start;
+        if pass == 0 {
+            self.slots.clear();
+        }
         rasterize(order, slots, |fragment| {
-            let slot = &mut self.slots[(fragment.slot - first) as usize];
             if pass == 0 {
-                *slot = Slot::default();
+                self.slots.push(Slot::default());
             }
+            let slot = &mut self.slots[(fragment.slot - first) as usize];
             if !slot.is_killed {
                 slot.is_killed = shade(fragment, &mut slot.state) == Verdict::Kill;
             }

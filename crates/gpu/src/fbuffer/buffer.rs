@@ -118,7 +118,8 @@ impl FBuffer {
         self.contents.iter().chain(own).map(wgpu::Buffer::size).sum()
     }
 
-    /// What the last window left in the slots of a buffer, in the order of [`Self::new`]; words of 4 bytes.
+    /// What the last window left in the slots of a buffer, in the order of [`Self::new`]; words of 4 bytes. Slots that it
+    /// did not have are left as they were.
     ///
     /// # Errors
     /// If the device fails.
@@ -206,7 +207,7 @@ impl FBuffer {
         }
         self.check(drawing, program, target)?;
         self.send(drawing, &slots);
-        let mut encoder = self.begin();
+        let mut encoder = self.begin(fragments);
         let group = self.group(drawing);
         for pipeline in &program.pipelines {
             self.pass(&mut encoder, pipeline, (groups, &group), fragments);
@@ -234,11 +235,15 @@ impl FBuffer {
         self.gpu.queue.write_buffer(&drawing.geometry, 0, bytemuck::bytes_of(&drawing.sent.window(slots)));
     }
 
-    /// Commands that begin with everything empty.
-    pub(super) fn begin(&self) -> wgpu::CommandEncoder {
+    /// Commands that begin with everything empty that so many fragments may look at.
+    pub(super) fn begin(&self, fragments: u64) -> wgpu::CommandEncoder {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         for buffer in self.contents.iter().chain([&self.places]) {
-            encoder.clear_buffer(buffer, 0, None);
+            let bytes = match self.keeping {
+                Keeping::Slots => buffer.size() / self.size.slots() * fragments,
+                Keeping::Pixels { .. } => buffer.size(),
+            };
+            encoder.clear_buffer(buffer, 0, Some(bytes));
         }
         encoder
     }

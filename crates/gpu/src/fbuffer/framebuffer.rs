@@ -144,7 +144,7 @@ impl Framebuffer {
         let windows = Windows::new(fragments, fbuffer.size());
         let group = fbuffer.group(drawing);
         fbuffer.send(drawing, &(0..fragments));
-        let mut encoder = fbuffer.begin();
+        let mut encoder = fbuffer.begin(fragments);
         for pipeline in early {
             fbuffer.pass(&mut encoder, pipeline, (groups, &group), fragments);
         }

@@ -159,13 +159,7 @@ impl GpuMultiPass {
     ///
     /// # Errors
     /// As [`Self::render`].
-    pub fn slots(
-        &mut self,
-        scene: &Scene,
-        view: &View,
-        shader: Shader,
-        size: Size,
-    ) -> Result<(Image, Windows), Error> {
+    pub fn slots(&mut self, scene: &Scene, view: &View, shader: Shader, size: Size) -> Result<(Image, Windows), Error> {
         let geometry = Geometry::new(scene, view, Pass::Transparent)?;
         let group = self.scene_group(scene, &geometry.draws)?;
         let kept = self.kept(shader, Through::FBuffer(size), [view.width, view.height])?;
@@ -208,9 +202,8 @@ impl GpuMultiPass {
     /// The buffer with its compiled passes, which replace those of another size.
     fn kept(&mut self, shader: Shader, through: Through, size: [u32; 2]) -> Result<usize, Error> {
         let is_fbuffer = matches!(through, Through::FBuffer(_));
-        let is_same_way = |kept: &Kept| {
-            kept.shader == shader && matches!(kept.through, Through::FBuffer(_)) == is_fbuffer
-        };
+        let is_same_way =
+            |kept: &Kept| kept.shader == shader && matches!(kept.through, Through::FBuffer(_)) == is_fbuffer;
         if let Some(place) = self.kept.iter().position(is_same_way) {
             let kept = &self.kept[place];
             if kept.through == through && (is_fbuffer || kept.size == size) {
@@ -258,8 +251,7 @@ impl GpuMultiPass {
             binding,
             resource: buffers[binding as usize].as_entire_binding(),
         });
-        let descriptor =
-            wgpu::BindGroupDescriptor { label: Some("scene"), layout: &self.layout, entries: &entries };
+        let descriptor = wgpu::BindGroupDescriptor { label: Some("scene"), layout: &self.layout, entries: &entries };
         Ok(self.gpu.device().create_bind_group(&descriptor))
     }
 }
