@@ -85,7 +85,7 @@ fn through_framebuffer(
     (scene, view): (&Scene, &View),
     window: Size,
 ) -> (Image, Drawn, u64) {
-    let mut framebuffer = Framebuffer::new(device, queue, [view.width, view.height], window, &CONTENTS).unwrap();
+    let framebuffer = Framebuffer::new(device, queue, [view.width, view.height], window, &CONTENTS).unwrap();
     let program = framebuffer.program(&PASSES, [None; 3]).unwrap();
     let drawing = framebuffer.drawing(geometry(scene, view)).unwrap();
     let target = framebuffer.target(GROUND).unwrap();
@@ -136,7 +136,7 @@ fn the_last_drawn_fragment_of_random_soups_is_that_of_the_cpu() {
     let Some((device, queue)) = device() else { return };
     let size = [53, 41];
     let window = Size::square(32).unwrap();
-    let mut framebuffer = Framebuffer::new(&device, &queue, size, window, &CONTENTS).unwrap();
+    let framebuffer = Framebuffer::new(&device, &queue, size, window, &CONTENTS).unwrap();
     let on_gpu = framebuffer.program(&PASSES, [None; 3]).unwrap();
     // Blending would add up what is rounded differently.
     let output = Output { blend: false, ..Output::default() };
@@ -163,7 +163,7 @@ fn what_is_for_the_other_kind_of_buffer_is_told() {
     let (scene, view) = load("@cyclic");
     let size = Size::square(128).unwrap();
     let mut fbuffer = FBuffer::new(&device, &queue, size, &CONTENTS).unwrap();
-    let mut framebuffer = Framebuffer::new(&device, &queue, [61, 47], size, &CONTENTS).unwrap();
+    let framebuffer = Framebuffer::new(&device, &queue, [61, 47], size, &CONTENTS).unwrap();
     let programs = [fbuffer.program(&PASSES, [None; 3]).unwrap(), framebuffer.program(&PASSES, [None; 3]).unwrap()];
     let drawings =
         [fbuffer.drawing(geometry(&scene, &view)).unwrap(), framebuffer.drawing(geometry(&scene, &view)).unwrap()];

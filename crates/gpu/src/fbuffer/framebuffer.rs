@@ -130,7 +130,7 @@ impl Framebuffer {
     /// # Errors
     /// [`FBufferError::Mixed`], [`FBufferError::TargetSize`], or if the device fails.
     pub fn draw(
-        &mut self,
+        &self,
         drawing: &Drawing,
         program: &Program,
         groups: Groups<'_>,
