@@ -6,8 +6,8 @@ use pellucid_core::fbuffer::{Drawn, Output, Overflow, Size, Windows};
 use wgpu::{BindGroup, BindGroupLayout, BufferUsages, ShaderStages};
 
 use super::raster::Raster;
-use super::sort::{KEY_BYTES, Sort, sort_steps};
-use super::target::{OutputData, OutputPass, read};
+use super::sort::{KEY_BYTES, Sort, run_steps};
+use super::target::{OutputPass, RUN, read};
 use super::{Content, Drawing, FBufferError, Keeping, LANES, Program, Target, dispatch};
 use crate::Context;
 use crate::pass::prefix_sum::PrefixSum;
@@ -80,7 +80,7 @@ impl FBuffer {
             Keeping::Pixels { count } => (count, count),
         };
         let buffer = |label: &str, bytes: u64| gpu.buffer(label, bytes, STORAGE);
-        let stages = Sort::stage_bytes(&gpu, sort_steps(&(0..slots)).len());
+        let stages = Sort::stage_bytes(&gpu, run_steps(&(0..slots), RUN).len());
         Ok(Self {
             wgsl: (OWN_BINDINGS..)
                 .zip(contents)
@@ -94,7 +94,7 @@ impl FBuffer {
             colors: buffer("F-Buffer colours", slots * 16)?,
             keys: buffer("F-Buffer keys", slots * KEY_BYTES)?,
             stages: buffer("F-Buffer sort", stages)?,
-            output_data: buffer("F-Buffer output", size_of::<OutputData>() as u64)?,
+            output_data: buffer("F-Buffer output", OutputPass::data_bytes(&gpu, slots))?,
             raster: Raster::new(&gpu),
             prefix_sum: PrefixSum::new(&gpu),
             sort: Sort::new(&gpu),
@@ -277,10 +277,9 @@ impl FBuffer {
     /// Tests and blends what the last pass left.
     pub(super) fn finish(&self, encoder: &mut wgpu::CommandEncoder, fragments: u64, output: Output, target: &Target) {
         let gpu = &self.gpu;
-        let steps = sort_steps(&(0..fragments));
+        let steps = run_steps(&(0..fragments), RUN);
         gpu.queue.write_buffer(&self.stages, 0, &Sort::stages(gpu, &steps));
-        let data = OutputData::new(output, target.width, fragments);
-        gpu.queue.write_buffer(&self.output_data, 0, bytemuck::bytes_of(&data));
+        gpu.queue.write_buffer(&self.output_data, 0, &OutputPass::data(gpu, output, target.width, fragments));
         let buffers = [&self.output_data, &self.places, &self.colors, &self.keys];
         let output_group = self.output.group(gpu, buffers, target);
         // Nothing is merged here.
@@ -290,7 +289,7 @@ impl FBuffer {
         for (number, step) in steps.iter().enumerate() {
             self.sort.record(gpu, &mut pass, &sort_group, step, number);
         }
-        self.output.blend(&mut pass, &output_group, fragments);
+        self.output.blend(gpu, &mut pass, &output_group, fragments);
     }
 
     pub(super) fn buffers_wgsl(&self) -> &str {
