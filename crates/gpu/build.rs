@@ -85,8 +85,11 @@ fn main() {
             }
         }
     }
-    for stem in ["raster", "shade", "collect", "sort", "output", "module"] {
+    for stem in ["raster", "shade", "collect", "sort", "output", "last"] {
         linked.insert(format!("FBUFFER_{}", stem.to_uppercase()), link("fbuffer", stem));
+    }
+    for (name, per_pixel) in [("FBUFFER_MODULE", false), ("FRAMEBUFFER_MODULE", true)] {
+        linked.insert(name.to_owned(), compile(&path("fbuffer", "module"), None, &[("per_pixel", per_pixel)]));
     }
     for words in 1..=4 {
         for (name, folder, stem, read_only) in [

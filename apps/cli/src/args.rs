@@ -386,8 +386,8 @@ fn suite_help() -> String {
 fn shader_help() -> String {
     let width = Shader::NAMES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let names = Shader::NAMES.iter().map(|(name, meaning)| format!("\n  {name:width$}  {meaning}"));
-    let what =
-        "A shader of several passes, on the CPU, blended in draw order; --resolve slots shows its F-Buffer's memory:";
+    let what = "A shader of several passes, on the CPU unless --backend gpu, blended in draw order; --resolve slots shows its \
+         F-Buffer's memory:";
     what.to_owned() + &names.collect::<String>()
 }
 

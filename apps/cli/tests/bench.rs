@@ -48,7 +48,7 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
     assert_eq!((&report["schema"], &report["command"]), (&1.into(), &"bench".into()));
     assert_eq!((&report["complete"], &report["plan"]["quick"]), (&true.into(), &true.into()));
     let suites: Vec<&str> = report["suites"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
-    assert_eq!(suites, ["lfb", "peel", "abuffer", "scale", "peers"]);
+    assert_eq!(suites, ["lfb", "peel", "abuffer", "fbuffer", "scale", "peers"]);
     let points = points(&report);
     assert!(points.len() > 20);
     for point in &points {
@@ -57,7 +57,9 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
             match result["outcome"].as_str().unwrap() {
                 "measured" => {
                     let samples = result["samples_ms"].as_array().unwrap();
-                    assert_eq!((samples.len(), &result["frames"], &result["exact"]), (2, &2.into(), &true.into()));
+                    assert_eq!((samples.len(), &result["frames"]), (2, &2.into()));
+                    // A framebuffer keeps the results of one fragment a pixel.
+                    assert_eq!(result["exact"], result["technique"] != "framebuffer");
                     let of = |key: &str| result[key].as_f64().unwrap();
                     let order = ["least_ms", "lower_ms", "median_ms", "upper_ms", "greatest_ms"].map(of);
                     assert!(order.is_sorted() && order[0] > 0.0, "{order:?}");
@@ -68,7 +70,7 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
     }
     assert!(outcome.stdout.contains("--backend cpu leaves the GPU out"), "{}", outcome.stdout);
     // The published figures stand beside, with what they were measured on.
-    for hardware in ["GeForce GTX 460", "GeForce GTX 660 Ti", "GeForce GTX 480"] {
+    for hardware in ["GeForce GTX 460", "GeForce GTX 660 Ti", "GeForce GTX 480", "ATI Radeon X800 series"] {
         assert!(outcome.stdout.contains(&format!("; {hardware}")), "{hardware}");
     }
 
@@ -103,6 +105,42 @@ fn a_software_gpu_is_measured_if_asked_for_and_told_apart_from_exact() {
     assert_eq!((&buffers["storage"], &textures["storage"]), (&"buffer".into(), &"texture".into()));
     // A fragment takes 20 bytes in textures, 16 in buffers.
     assert!(textures["peak_bytes"].as_u64() > buffers["peak_bytes"].as_u64());
+}
+
+#[test]
+fn f_buffers_take_the_windows_of_the_formula_on_either_backend() {
+    let gpu = std::env::var("PELLUCID_REQUIRE_GPU").as_deref() == Ok("1");
+    let backends: &[&str] = if gpu { &["cpu", "gpu"] } else { &["cpu"] };
+    let work = Workplace::new();
+    let outcome = work.succeed(&format!("bench --suite fbuffer --quick --backend {} -o out", backends.last().unwrap()));
+    for part in [
+        "Windows of slots, and how often geometry is drawn",
+        "Time through an F-Buffer over that through a framebuffer",
+        "64 x 64          162                       489",
+        "figure 3       23                        69",
+    ] {
+        assert!(outcome.stdout.contains(part), "{part}: {}", outcome.stdout);
+    }
+    let report = json(&work, "out");
+    let shaded: Vec<&Value> = points(&report).into_iter().filter(|point| !point["shader"].is_null()).collect();
+    assert_eq!(shaded.len(), 8);
+    for point in shaded {
+        let (fragments, side) = (point["fragments"].as_u64().unwrap(), point["fbuffer"].as_u64().unwrap());
+        let passes = if point["shader"] == "lighting" { 2 } else { 3 };
+        let windows = fragments.div_ceil(side * side).max(1);
+        let of = |name: String| point["results"].as_array().unwrap().iter().find(|result| result["name"] == *name);
+        for backend in backends {
+            let ours = of(format!("{backend} fbuffer")).unwrap();
+            assert_eq!((&ours["slot_windows"], &ours["submissions"]), (&windows.into(), &(passes * windows).into()));
+            assert_eq!((&ours["technique"], &ours["backend"]), (&"fbuffer".into(), &(*backend).into()));
+            let steps: Vec<&str> =
+                ours["steps"].as_array().unwrap().iter().map(|step| step["name"].as_str().unwrap()).collect();
+            assert!(steps.contains(&"geometry") && steps.contains(&"passes"), "{steps:?}");
+            if let Some(plain) = of(format!("{backend} framebuffer")) {
+                assert_eq!((&plain["submissions"], &plain["technique"]), (&passes.into(), &"framebuffer".into()));
+            }
+        }
+    }
 }
 
 #[test]

@@ -48,6 +48,33 @@ fn slots_draw_the_memory_of_the_buffer() {
 }
 
 #[test]
+fn a_gpu_gives_the_same_pictures() {
+    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
+        return eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
+    }
+    let work = Workplace::new();
+    for line in [
+        "@fbuffer --size 100x80 --shader lighting --through both",
+        "@fbuffer:figure=rainbow --size 256x256 --resolve slots --fbuffer 64",
+    ] {
+        let on_cpu = figures(&work, &format!("{line} -o cpu.png --backend cpu"));
+        let mut on_gpu = figures(&work, &format!("{line} -o gpu.png --backend gpu"));
+        assert_eq!((&on_cpu["backend"], &on_gpu["backend"]), (&"cpu".into(), &"gpu".into()));
+        for key in ["backend", "bytes", "total_ms"] {
+            on_gpu[key] = on_cpu[key].clone();
+        }
+        assert_eq!(on_gpu, on_cpu);
+        let differs = |(have, want): (u8, u8)| have.abs_diff(want) > 1;
+        let (have, want) = (work.png("gpu.png").to_rgba8(), work.png("cpu.png").to_rgba8());
+        let pairs = have.as_raw().iter().copied().zip(want.as_raw().iter().copied());
+        assert_eq!(pairs.filter(|&pair| differs(pair)).count(), 0, "{line}");
+    }
+    let outcome = work.run("render @tree -o a.png --size 8x8 --shader lighting --backend gpu");
+    assert_eq!(outcome.code, 1);
+    assert!(outcome.error().contains("textures"), "{}", outcome.stderr);
+}
+
+#[test]
 fn what_does_not_go_together_is_refused() {
     let work = Workplace::new();
     for line in [

@@ -154,8 +154,8 @@ fn windows_take_the_submissions_and_bytes_of_the_formula() {
         let drawn = fbuffer.draw(&order, &three_passes(), Output::default(), &mut blank(&view));
         assert_eq!((drawn.windows, drawn.submissions), (windows.count(), windows.submissions(3)), "{size}");
         assert_eq!(drawn.fragments, order.fragments());
-        // Two targets, and a word on whether the fragment was killed, aligned as they are.
-        assert_eq!(fbuffer.bytes(), size.slots() * 48);
+        // Two targets, and whether the fragment was killed.
+        assert_eq!(fbuffer.bytes(), size.slots() * 33);
         let (remaining, first) = fbuffer.window(&order, &three_passes(), 0, Output::default(), &mut blank(&view));
         assert_eq!((remaining, first.submissions), (windows.count() - 1, 3));
     }

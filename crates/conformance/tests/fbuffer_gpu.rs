@@ -7,28 +7,18 @@ use pellucid::core::fbuffer::sort::{Key, merge_runs, sort};
 use pellucid::core::fbuffer::{Drawn, Output, Overflow, RasterOrder, Size, Windows};
 use pellucid::core::primitive::Pass;
 use pellucid::gpu::fbuffer::{Content, FBuffer, FBufferError, sort_keys};
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, wgpu};
+use pellucid::gpu::wgpu;
 use pellucid::{Camera, Image, Instance, Material, Mesh, Projection, Renderer, Resolve, Scene, Technique, View};
 use pellucid_conformance::layers;
 use pellucid_conformance::suite::CASES;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
+mod common;
 #[path = "common/soup.rs"]
 mod soup;
 
-/// A device, if they are asked for; see `gpu.rs`.
-fn gpu(floor: bool) -> Option<GpuRenderer> {
-    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
-        eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
-        return None;
-    }
-    match GpuRenderer::new(&ContextOptions { floor, allow_software: true }) {
-        Ok(gpu) => Some(gpu),
-        Err(error @ GpuError::NoAdapter) => panic!("PELLUCID_REQUIRE_GPU is 1, but: {error}"),
-        Err(error) => panic!("{error}"),
-    }
-}
+use common::gpu;
 
 #[test]
 fn merged_windows_give_the_same_bits_as_one() {
@@ -249,6 +239,38 @@ fn kills_and_masks_lead_no_later_pass_astray() {
             let killed = slots.chunks_exact(4).take(drawn.fragments as usize).step_by(3);
             assert!(killed.flatten().all(|&word| word == 0), "no pass sees a fragment that was killed before");
         }
+    }
+}
+
+#[test]
+fn a_state_of_ones_own_counts_the_passes_over_its_fragment() {
+    let Some(device) = device() else { return };
+    let state = Content::State {
+        name: "Visits",
+        declaration: "struct Visits { slot: u32, passes: u32, share: f32 }",
+        stride: 12,
+    };
+    let visit = "fn shade(fragment: Fragment) {
+        var visits = state_load(fragment);
+        // One more than the slot, as 0 is a slot that no pass wrote.
+        if visits.passes == 0u || visits.slot == fragment.slot + 1u {
+            visits = Visits(fragment.slot + 1u, visits.passes + 1u, visits.share + 0.25);
+        }
+        state_store(fragment, visits);
+    }";
+    let last = "fn shade(fragment: Fragment) -> vec4<f32> {
+        let visits = state_load(fragment);
+        return vec4(vec3(visits.share), select(0.0, 1.0, visits.passes == 4u && visits.slot == fragment.slot + 1u));
+    }";
+    let scene = pellucid::load("@cyclic").unwrap().scene;
+    let view = View::of(&scene).size(47, 35).opacity(0.5);
+    let one = "fn shade(fragment: Fragment) -> vec4<f32> { return vec4(1.0); }";
+    let (expected, _) = picture(&mut buffer(&device, Size::square(256).unwrap(), &[]), &scene, &view, &[one]);
+    for size in sizes() {
+        let mut fbuffer = buffer(&device, size, &[("state", state)]);
+        let (image, drawn) = picture(&mut fbuffer, &scene, &view, &[visit, visit, visit, visit, last]);
+        assert!(image == expected, "{size}");
+        assert_eq!(drawn.submissions, 5 * drawn.windows, "{size}");
     }
 }
 

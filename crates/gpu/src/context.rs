@@ -100,6 +100,16 @@ impl Context {
         Self { device, queue, limits, features, name: "your device".to_owned(), is_software: false, faults }
     }
 
+    /// The device itself.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Where its work is submitted.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
     /// The device, in words.
     pub fn name(&self) -> &str {
         &self.name
@@ -123,7 +133,10 @@ impl Context {
     }
 
     /// Waits until everything submitted is done.
-    pub(crate) fn wait(&self) -> Result<(), GpuError> {
+    ///
+    /// # Errors
+    /// The first error since the last call.
+    pub fn wait(&self) -> Result<(), GpuError> {
         let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
         self.check()?;
         polled.map(drop).map_err(|error| GpuError::Lost(error.to_string()))

@@ -15,6 +15,14 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] pellucid_gpu::GpuError),
+    /// An F-Buffer cannot do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    FBuffer(#[from] pellucid_gpu::fbuffer::FBufferError),
+    /// A scene with textures, for a shader of several passes on a GPU.
+    #[cfg(feature = "gpu")]
+    #[error("on a GPU, shaders of several passes know no textures, and this scene has some; on the CPU they do")]
+    Textures,
     /// A technique of the GPU, in a build without it.
     #[cfg(not(feature = "gpu"))]
     #[error("'{0}' runs on a GPU, and this build has no GPU renderer (feature `gpu`)")]

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use pellucid::core::fbuffer::{Drawn, Size, Windows};
-use pellucid::multi_pass::{self, Picture, Through, differing_pixels};
+use pellucid::gpu::{Context, ContextOptions};
+use pellucid::multi_pass::{self, GpuMultiPass, Picture, Through, differing_pixels};
 use pellucid::{Image, Scene, View};
 use serde::Serialize;
 
@@ -20,6 +21,7 @@ struct Figures {
     schema: u32,
     scene: String,
     shader: String,
+    backend: &'static str,
     width: u32,
     height: u32,
     fragments: u64,
@@ -46,15 +48,28 @@ pub(crate) fn run(
     let shader = multi_pass.shader;
     let fragments = multi_pass::fragments(scene, view)?;
     let size = multi_pass.size.unwrap_or(Size::holding(fragments));
-    let draw = |through| multi_pass::render(scene, view, shader, through);
+    let mut gpu = match multi_pass.is_on_gpu {
+        true => {
+            let options = ContextOptions { allow_software: true, ..ContextOptions::default() };
+            Some(GpuMultiPass::new(Context::new(&options)?))
+        }
+        false => None,
+    };
+    let mut draw = |through| match &mut gpu {
+        Some(gpu) => gpu.render(scene, view, shader, through),
+        None => Ok(multi_pass::render(scene, view, shader, through)?),
+    };
     let mut wrong_pixels = None;
     let picture = match multi_pass.show {
         Show::Slots => {
-            let (image, windows) = multi_pass::slots(scene, view, shader, size)?;
+            let (image, windows) = match &mut gpu {
+                Some(gpu) => gpu.slots(scene, view, shader, size)?,
+                None => multi_pass::slots(scene, view, shader, size)?,
+            };
             // Of all its windows, the first is shown.
             let drawn =
                 Drawn { windows: windows.count(), submissions: windows.submissions(shader.passes()), fragments };
-            Picture { image, drawn, bytes: 0 }
+            Picture { image, drawn, bytes: 0, steps: Vec::new() }
         }
         Show::View(ThroughArg::Fbuffer) => draw(Through::FBuffer(size))?,
         Show::View(ThroughArg::Framebuffer) => draw(Through::Framebuffer)?,
@@ -76,6 +91,7 @@ pub(crate) fn run(
             schema: SCHEMA,
             scene: plan.scene.to_string(),
             shader: shader.to_string(),
+            backend: if multi_pass.is_on_gpu { "gpu" } else { "cpu" },
             width,
             height,
             fragments,
@@ -102,11 +118,12 @@ pub(crate) fn run(
         });
         progress.suspend(|| {
             terminal::note(&format!(
-                "{}: {width} x {height}, {} fragments, {what}, geometry drawn {}{wrong}, {} (cpu)",
+                "{}: {width} x {height}, {} fragments, {what}, geometry drawn {}{wrong}, {} ({})",
                 plan.output.display(),
                 short_count(fragments),
                 plural(submissions, "time"),
                 duration(total_ms),
+                gpu.as_ref().map_or("cpu", |gpu| gpu.context().name()),
             ));
         });
     }

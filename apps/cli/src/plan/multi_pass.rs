@@ -4,7 +4,7 @@ use pellucid::core::fbuffer::{SIDES, Size};
 use pellucid::multi_pass::Shader;
 
 use super::{optional, usage};
-use crate::args::{RenderArgs, ThroughArg};
+use crate::args::{Backend, RenderArgs, ThroughArg};
 use crate::values;
 
 /// A picture by a shader of several passes.
@@ -14,6 +14,8 @@ pub(crate) struct MultiPassPlan {
     /// Of the F-Buffer; `None` for one that holds all fragments.
     pub(crate) size: Option<Size>,
     pub(crate) show: Show,
+    /// Whether a GPU was asked for; a software one will do.
+    pub(crate) is_on_gpu: bool,
 }
 
 /// What is in the picture.
@@ -47,7 +49,7 @@ impl MultiPassPlan {
             ("--through", shows_slots && args.through.is_some()),
         ];
         if let Some((other, _)) = others.iter().find(|(_, is_given)| *is_given) {
-            return Err(usage(format!("{other} does not go with {because}, which blends on the CPU in draw order")));
+            return Err(usage(format!("{other} does not go with {because}, which blends in draw order")));
         }
         Ok(Some(Self {
             shader: shader.parse().map_err(|error| usage(format!("{error}")))?,
@@ -56,6 +58,7 @@ impl MultiPassPlan {
                 true => Show::Slots,
                 false => Show::View(args.through.unwrap_or(ThroughArg::Fbuffer)),
             },
+            is_on_gpu: args.capture.device.backend == Backend::Gpu,
         }))
     }
 }

@@ -14,6 +14,7 @@ mod target;
 
 use std::ops::Range;
 
+use glam::Vec4;
 pub use pellucid_core::fbuffer::{Drawn, Output};
 use pellucid_core::fbuffer::{Overflow, Place, RasterOrder, Size, Windows};
 
@@ -27,19 +28,17 @@ use fragment::Shaded;
 #[derive(Debug)]
 pub struct FBuffer<S> {
     size: Size,
-    slots: Vec<Slot<S>>,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Slot<S> {
-    state: S,
-    is_killed: bool,
+    /// Of the slots that the window has, within the room there is: first in, first out.
+    states: Vec<S>,
+    /// Apart, as beside a state they would take as much as what that is aligned to.
+    is_killed: Vec<bool>,
 }
 
 impl<S: Copy + Default> FBuffer<S> {
     /// A buffer of a size, which is all it will ever hold.
     pub fn new(size: Size) -> Self {
-        Self { size, slots: vec![Slot::default(); size.slots() as usize] }
+        let slots = size.slots() as usize;
+        Self { size, states: Vec::with_capacity(slots), is_killed: Vec::with_capacity(slots) }
     }
 
     /// How many slots it has.
@@ -49,15 +48,15 @@ impl<S: Copy + Default> FBuffer<S> {
 
     /// Bytes it holds.
     pub fn bytes(&self) -> u64 {
-        (self.slots.capacity() * size_of::<Slot<S>>()) as u64
+        (self.states.capacity() * size_of::<S>() + self.is_killed.capacity()) as u64
     }
 
     /// What the last window left in a slot of the buffer.
     ///
     /// # Panics
-    /// If there is no such slot.
+    /// If no fragment had such a slot.
     pub fn state(&self, slot: u64) -> &S {
-        &self.slots[slot as usize].state
+        &self.states[slot as usize]
     }
 
     /// Draws everything, however much it is: a window slides over the order, and fragments outside of it are discarded
@@ -154,14 +153,11 @@ impl<S: Copy + Default> FBuffer<S> {
         target: &mut Target,
     ) -> Drawn {
         target.check(order);
-        for pass in 0..program.passes.len() {
-            self.pass(order, program, pass, slots.clone());
-        }
+        self.passes(order, program, slots.clone());
         let first = slots.start;
         let drawn = Drawn { windows: 1, submissions: program.pass_count(), fragments: slots.end - first };
         rasterize(order, slots, |fragment| {
-            let slot = &self.slots[(fragment.slot - first) as usize];
-            let color = if slot.is_killed { None } else { (program.last)(fragment, &slot.state) };
+            let color = self.color(program, fragment, first);
             if let Some(color) = color {
                 target.write(fragment, color, output);
             }
@@ -169,19 +165,49 @@ impl<S: Copy + Default> FBuffer<S> {
         drawn
     }
 
+    /// All passes but the last.
+    fn passes(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, slots: Range<u64>) {
+        // A shader of one pass finds its slots empty.
+        let slots_used = if program.passes.is_empty() { slots.end - slots.start } else { 0 };
+        self.clear(slots_used as usize);
+        for pass in 0..program.passes.len() {
+            self.pass(order, program, pass, slots.clone());
+        }
+    }
+
     /// One pass but the last. The first finds its slots empty.
     fn pass(&mut self, order: &RasterOrder<'_>, program: &Program<'_, S>, pass: usize, slots: Range<u64>) {
         let Some(shade) = program.passes.get(pass) else { return };
         let first = slots.start;
+        if pass == 0 {
+            // They come one after the other.
+            self.clear(0);
+            return rasterize(order, slots, |fragment| {
+                let mut state = S::default();
+                self.is_killed.push(shade(fragment, &mut state) == Verdict::Kill);
+                self.states.push(state);
+            });
+        }
         rasterize(order, slots, |fragment| {
-            let slot = &mut self.slots[(fragment.slot - first) as usize];
-            if pass == 0 {
-                *slot = Slot::default();
-            }
-            if !slot.is_killed {
-                slot.is_killed = shade(fragment, &mut slot.state) == Verdict::Kill;
+            let slot = (fragment.slot - first) as usize;
+            if !self.is_killed[slot] {
+                self.is_killed[slot] = shade(fragment, &mut self.states[slot]) == Verdict::Kill;
             }
         });
+    }
+
+    /// What the last pass makes of a fragment, in a window that begins with the slot `first`.
+    fn color(&self, program: &Program<'_, S>, fragment: &Fragment<'_>, first: u64) -> Option<Vec4> {
+        let slot = (fragment.slot - first) as usize;
+        if self.is_killed[slot] { None } else { (program.last)(fragment, &self.states[slot]) }
+    }
+
+    /// Leaves so many slots, all of them empty.
+    fn clear(&mut self, slots: usize) {
+        self.states.clear();
+        self.is_killed.clear();
+        self.states.resize(slots, S::default());
+        self.is_killed.resize(slots, false);
     }
 }
 
@@ -198,18 +224,22 @@ pub fn draw_through_framebuffer<S: Copy + Default>(
 ) {
     target.check(order);
     let all = 0..order.fragments();
-    let mut pixels = vec![Slot::<S>::default(); target.depth.len()];
+    // And the number of the pass that killed it, from 1.
+    let (mut states, mut killed_by) = (vec![S::default(); target.depth.len()], vec![0; target.depth.len()]);
     let width = target.color.width();
     let index = |fragment: &Fragment<'_>| (fragment.y * width + fragment.x) as usize;
-    for shade in &program.passes {
+    for (number, shade) in (1..).zip(&program.passes) {
         rasterize(order, all.clone(), |fragment| {
-            let pixel = &mut pixels[index(fragment)];
-            pixel.is_killed = shade(fragment, &mut pixel.state) == Verdict::Kill;
+            let pixel = index(fragment);
+            if [0, number].contains(&killed_by[pixel]) {
+                let verdict = shade(fragment, &mut states[pixel]);
+                killed_by[pixel] = if verdict == Verdict::Kill { number } else { 0u16 };
+            }
         });
     }
     rasterize(order, all, |fragment| {
-        let pixel = &pixels[index(fragment)];
-        let color = if pixel.is_killed { None } else { (program.last)(fragment, &pixel.state) };
+        let pixel = index(fragment);
+        let color = if killed_by[pixel] > 0 { None } else { (program.last)(fragment, &states[pixel]) };
         if let Some(color) = color {
             target.write(fragment, color, output);
         }

@@ -36,12 +36,9 @@ impl<S: Copy + Default> FBuffer<S> {
             let slots = windows.slots(window);
             let first = slots.start;
             drawn = drawn + Drawn { windows: 1, submissions: program.pass_count(), fragments: slots.end - first };
-            for pass in 0..program.passes.len() {
-                self.pass(order, program, pass, slots.clone());
-            }
+            self.passes(order, program, slots.clone());
             rasterize(order, slots, |fragment| {
-                let slot = &self.slots[(fragment.slot - first) as usize];
-                let color = if slot.is_killed { None } else { (program.last)(fragment, &slot.state) };
+                let color = self.color(program, fragment, first);
                 let pixel = fragment.y * opaque.color.width() + fragment.x;
                 let is_seen = color.is_some() && fragment.depth >= opaque.depth[pixel as usize];
                 keys.push(Key {

@@ -11,7 +11,7 @@ fn shade(fragment: Fragment) {
         pit(position + vec3(0.0, 0.0, STEP)) - depth,
     ) / STEP;
     let bumped = normalize(normal + slope * 0.06);
-    let facing = select(bumped, -bumped, dot(bumped, eye() - position) < 0.0);
+    let facing = select(bumped, -bumped, dot(bumped, eye(fragment) - position) < 0.0);
     surface_store(fragment, 0u, vec4(facing, depth));
 }
 

@@ -25,6 +25,7 @@ fn normal_of(fragment: Fragment) -> vec3<f32> {
         + vertex_of(fragment, 2u).normal.xyz * fragment.weights.z);
 }
 
-fn eye() -> vec3<f32> {
+// In the mesh's own space, which of several instances each would have another of.
+fn eye(fragment: Fragment) -> vec3<f32> {
     return vertices[0].position.xyz;
 }

@@ -1,7 +1,7 @@
 // Pass 2: light from behind and from in front, each with its share.
 
 fn shade(fragment: Fragment) {
-    let sight = normalize(position_of(fragment) - eye());
+    let sight = normalize(position_of(fragment) - eye(fragment));
     let normal = surface_load(fragment, 0u).xyz;
     let cosine = clamp(-dot(sight, normal), 0.0, 1.0);
     // Schlick's approximation, for glass in air.

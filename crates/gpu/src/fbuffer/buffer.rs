@@ -6,9 +6,9 @@ use pellucid_core::fbuffer::{Drawn, Output, Overflow, Size, Windows};
 use wgpu::{BindGroup, BindGroupLayout, BufferUsages, ShaderStages};
 
 use super::raster::Raster;
-use super::sort::{KEY_BYTES, Sort, sort_steps};
-use super::target::{OutputData, OutputPass, read};
-use super::{Content, Drawing, FBufferError, LANES, Program, Target, dispatch};
+use super::sort::{KEY_BYTES, Sort, run_steps};
+use super::target::{OutputPass, RUN, read};
+use super::{Content, Drawing, FBufferError, Keeping, LANES, Program, Target, dispatch};
 use crate::Context;
 use crate::pass::prefix_sum::PrefixSum;
 use crate::surface::storage_entry;
@@ -30,6 +30,7 @@ pub struct FBuffer {
     /// Group 3 of a program's passes.
     pub(super) layout: BindGroupLayout,
     size: Size,
+    pub(super) keeping: Keeping,
     /// What passes may read and write: in WGSL, and in memory.
     wgsl: String,
     contents: Vec<wgpu::Buffer>,
@@ -54,7 +55,15 @@ impl FBuffer {
         size: Size,
         contents: &[(&str, Content<'_>)],
     ) -> Result<Self, FBufferError> {
-        let gpu = Context::adopt(device.clone(), queue.clone());
+        Self::keeping(Context::adopt(device.clone(), queue.clone()), size, contents, Keeping::Slots)
+    }
+
+    pub(super) fn keeping(
+        gpu: Context,
+        size: Size,
+        contents: &[(&str, Content<'_>)],
+        keeping: Keeping,
+    ) -> Result<Self, FBufferError> {
         for (name, content) in contents {
             content.check(name)?;
         }
@@ -65,8 +74,13 @@ impl FBuffer {
             .device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("F-Buffer"), entries: &entries });
         let slots = size.slots();
+        // How many intermediate results there are, and how many of them stand behind the slots.
+        let (results, behind) = match keeping {
+            Keeping::Slots => (slots, 0),
+            Keeping::Pixels { count } => (count, count),
+        };
         let buffer = |label: &str, bytes: u64| gpu.buffer(label, bytes, STORAGE);
-        let stages = Sort::stage_bytes(&gpu, sort_steps(&(0..slots)).len());
+        let stages = Sort::stage_bytes(&gpu, run_steps(&(0..slots), RUN).len());
         Ok(Self {
             wgsl: (OWN_BINDINGS..)
                 .zip(contents)
@@ -74,19 +88,20 @@ impl FBuffer {
                 .collect(),
             contents: contents
                 .iter()
-                .map(|(name, content)| buffer(name, slots * content.bytes()))
+                .map(|(name, content)| buffer(name, results * content.bytes()))
                 .collect::<Result<_, _>>()?,
-            places: buffer("F-Buffer places", slots * 16)?,
+            places: buffer("F-Buffer places", (slots + behind) * 16)?,
             colors: buffer("F-Buffer colours", slots * 16)?,
             keys: buffer("F-Buffer keys", slots * KEY_BYTES)?,
             stages: buffer("F-Buffer sort", stages)?,
-            output_data: buffer("F-Buffer output", size_of::<OutputData>() as u64)?,
+            output_data: buffer("F-Buffer output", OutputPass::data_bytes(&gpu, slots))?,
             raster: Raster::new(&gpu),
             prefix_sum: PrefixSum::new(&gpu),
             sort: Sort::new(&gpu),
             output: OutputPass::new(&gpu),
             layout,
             size,
+            keeping,
             gpu,
         })
     }
@@ -103,7 +118,8 @@ impl FBuffer {
         self.contents.iter().chain(own).map(wgpu::Buffer::size).sum()
     }
 
-    /// What the last window left in the slots of a buffer, in the order of [`Self::new`]; words of 4 bytes.
+    /// What the last window left in the slots of a buffer, in the order of [`Self::new`]; words of 4 bytes. Slots that it
+    /// did not have are left as they were.
     ///
     /// # Errors
     /// If the device fails.
@@ -185,36 +201,85 @@ impl FBuffer {
         output: Output,
         target: &Target,
     ) -> Result<Drawn, FBufferError> {
-        let (gpu, fragments) = (&self.gpu, slots.end - slots.start);
+        let fragments = slots.end - slots.start;
         if fragments > self.size.slots() {
             return Err(Overflow { needed: fragments, slots: self.size.slots() }.into());
+        }
+        self.check(drawing, program, target)?;
+        self.send(drawing, &slots);
+        let mut encoder = self.begin(fragments);
+        let group = self.group(drawing);
+        for pipeline in &program.pipelines {
+            self.pass(&mut encoder, pipeline, (groups, &group), fragments);
+        }
+        self.finish(&mut encoder, fragments, output, target);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.check()?;
+        Ok(Drawn { windows: 1, submissions: program.pass_count(), fragments })
+    }
+
+    /// Whether all of it belongs together.
+    pub(super) fn check(&self, drawing: &Drawing, program: &Program, target: &Target) -> Result<(), FBufferError> {
+        if [drawing.keeping, program.keeping].iter().any(|&keeping| keeping != self.keeping) {
+            return Err(FBufferError::Mixed);
         }
         let have = [target.width, target.height];
         if have != drawing.size {
             return Err(FBufferError::TargetSize { have, need: drawing.size });
         }
-        let steps = sort_steps(&(0..fragments));
-        gpu.queue.write_buffer(&drawing.geometry, 0, bytemuck::bytes_of(&drawing.sent.window(&slots)));
-        gpu.queue.write_buffer(&self.stages, 0, &Sort::stages(gpu, &steps));
-        let data = OutputData::new(output, target.width, fragments);
-        gpu.queue.write_buffer(&self.output_data, 0, bytemuck::bytes_of(&data));
+        Ok(())
+    }
 
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    /// Tells the device which slots are in the window of what is submitted next.
+    pub(super) fn send(&self, drawing: &Drawing, slots: &Range<u64>) {
+        self.gpu.queue.write_buffer(&drawing.geometry, 0, bytemuck::bytes_of(&drawing.sent.window(slots)));
+    }
+
+    /// Commands that begin with everything empty that so many fragments may look at.
+    pub(super) fn begin(&self, fragments: u64) -> wgpu::CommandEncoder {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         for buffer in self.contents.iter().chain([&self.places]) {
-            encoder.clear_buffer(buffer, 0, None);
+            let bytes = match self.keeping {
+                Keeping::Slots => buffer.size() / self.size.slots() * fragments,
+                Keeping::Pixels { .. } => buffer.size(),
+            };
+            encoder.clear_buffer(buffer, 0, Some(bytes));
         }
-        let group = self.group(drawing);
-        for pipeline in &program.pipelines {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(pipeline);
-            for (number, own) in (0..).zip(groups) {
-                if let Some(own) = own {
-                    pass.set_bind_group(number, own, &[]);
-                }
+        encoder
+    }
+
+    /// Commands that leave intermediate results alone, and begin with slots that nothing was drawn to.
+    pub(super) fn go_on(&self) -> wgpu::CommandEncoder {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(&self.places, 0, Some(self.size.slots() * 16));
+        encoder
+    }
+
+    /// One pass over the fragments of a window.
+    pub(super) fn pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipeline: &wgpu::ComputePipeline,
+        (groups, own): (Groups<'_>, &BindGroup),
+        fragments: u64,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(pipeline);
+        for (number, group) in (0..).zip(groups) {
+            if let Some(group) = group {
+                pass.set_bind_group(number, group, &[]);
             }
-            pass.set_bind_group(3, &group, &[]);
-            dispatch(&mut pass, fragments.div_ceil(LANES));
         }
+        pass.set_bind_group(3, own, &[]);
+        dispatch(&mut pass, fragments.div_ceil(LANES));
+    }
+
+    /// Tests and blends what the last pass left.
+    pub(super) fn finish(&self, encoder: &mut wgpu::CommandEncoder, fragments: u64, output: Output, target: &Target) {
+        let gpu = &self.gpu;
+        let steps = run_steps(&(0..fragments), RUN);
+        gpu.queue.write_buffer(&self.stages, 0, &Sort::stages(gpu, &steps));
+        gpu.queue.write_buffer(&self.output_data, 0, &OutputPass::data(gpu, output, target.width, fragments));
         let buffers = [&self.output_data, &self.places, &self.colors, &self.keys];
         let output_group = self.output.group(gpu, buffers, target);
         // Nothing is merged here.
@@ -224,18 +289,14 @@ impl FBuffer {
         for (number, step) in steps.iter().enumerate() {
             self.sort.record(gpu, &mut pass, &sort_group, step, number);
         }
-        self.output.blend(&mut pass, &output_group, fragments);
-        drop(pass);
-        gpu.queue.submit([encoder.finish()]);
-        gpu.check()?;
-        Ok(Drawn { windows: 1, submissions: program.pass_count(), fragments })
+        self.output.blend(gpu, &mut pass, &output_group, fragments);
     }
 
     pub(super) fn buffers_wgsl(&self) -> &str {
         &self.wgsl
     }
 
-    fn group(&self, drawing: &Drawing) -> BindGroup {
+    pub(super) fn group(&self, drawing: &Drawing) -> BindGroup {
         let own = [&drawing.geometry, &drawing.runs, &self.places, &self.colors];
         let entries: Vec<_> = (0..)
             .zip(own.into_iter().chain(&self.contents))

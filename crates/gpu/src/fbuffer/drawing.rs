@@ -5,7 +5,7 @@ use wgpu::BufferUsages;
 
 use super::geometry::{GridGeometry, SentGeometry};
 use super::raster::RUN_BYTES;
-use super::{FBuffer, FBufferError};
+use super::{FBuffer, FBufferError, Keeping};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::mapped;
 
@@ -17,7 +17,10 @@ pub struct Drawing {
     pub(super) size: [u32; 2],
     pub(super) sent: SentGeometry,
     pub(super) geometry: wgpu::Buffer,
+    /// And for a framebuffer, the last fragment of each pixel.
     pub(super) runs: wgpu::Buffer,
+    /// For what kind of buffer.
+    pub(super) keeping: Keeping,
     fragments: u32,
 }
 
@@ -40,7 +43,11 @@ impl FBuffer {
         let buffer = |label: &str, bytes: u64| gpu.buffer(label, bytes.max(16), STORAGE);
         let words = buffer("F-Buffer geometry", sent.bytes())?;
         gpu.queue.write_buffer(&words, 0, bytemuck::cast_slice(&sent.words));
-        let runs = buffer("F-Buffer runs", lengths * RUN_BYTES)?;
+        let behind = match self.keeping {
+            Keeping::Slots => 0,
+            Keeping::Pixels { count } => count,
+        };
+        let runs = buffer("F-Buffer runs", (lengths + behind) * RUN_BYTES)?;
         let mut sums = vec![buffer("F-Buffer lengths", lengths * 4)?];
         for (name, bytes) in PrefixSum::needs(lengths) {
             sums.push(buffer(name, bytes)?);
@@ -62,9 +69,14 @@ impl FBuffer {
         match total[0] {
             // Sums stick there.
             u32::MAX => Err(FBufferError::TooManyFragments),
-            fragments => {
-                Ok(Drawing { size: [viewport.width, viewport.height], sent, geometry: words, runs, fragments })
-            }
+            fragments => Ok(Drawing {
+                size: [viewport.width, viewport.height],
+                sent,
+                geometry: words,
+                runs,
+                keeping: self.keeping,
+                fragments,
+            }),
         }
     }
 }

@@ -34,6 +34,9 @@ pub enum FBufferError {
         /// Width and height of the picture.
         need: [u32; 2],
     },
+    /// A drawing or a program of another kind of buffer.
+    #[error("a drawing or a program for an F-Buffer, where a framebuffer is, or the other way round")]
+    Mixed,
     /// More fragments than slots, where no window slides over them.
     #[error(transparent)]
     Overflow(#[from] Overflow),

@@ -35,12 +35,13 @@
 //! ```
 //!
 //! By module: `geometry` is what is sent to the device, `raster` counts and sums, `drawing` holds the outcome; `program` is
-//! the text of passes, `buffer` runs them, `target` tests and blends, `sort` orders fragments. The renderer's technique
-//! `fbuffer` is made of the same parts.
+//! the text of passes, `buffer` runs them, `target` tests and blends, `sort` orders fragments; `framebuffer` runs the same
+//! passes with one intermediate result a pixel, to compare. The renderer's technique `fbuffer` is made of the same parts.
 
 mod buffer;
 mod drawing;
 mod error;
+mod framebuffer;
 pub(crate) mod geometry;
 mod program;
 pub(crate) mod raster;
@@ -50,9 +51,34 @@ mod target;
 pub use buffer::{FBuffer, Groups};
 pub use drawing::Drawing;
 pub use error::FBufferError;
+pub use framebuffer::Framebuffer;
 pub use program::{Content, Program};
 pub use sort::sort_keys;
 pub use target::Target;
+
+use crate::shaders;
+
+/// Where intermediate results are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Keeping {
+    /// One for each fragment, in its slot.
+    Slots,
+    /// One for each of so many pixels.
+    Pixels {
+        /// Of the picture.
+        count: u64,
+    },
+}
+
+impl Keeping {
+    /// What passes know of it.
+    fn module(self) -> &'static str {
+        match self {
+            Self::Slots => shaders::FBUFFER_MODULE,
+            Self::Pixels { .. } => shaders::FRAMEBUFFER_MODULE,
+        }
+    }
+}
 
 /// Invocations of a workgroup in passes over fragments and runs: `LANES` of the shaders.
 pub(crate) const LANES: u64 = 64;

@@ -4,9 +4,8 @@ use std::fmt::Write;
 
 use wgpu::{BindGroupLayout, ComputePipeline};
 
-use super::{FBuffer, FBufferError};
+use super::{FBuffer, FBufferError, Keeping};
 use crate::pass::ordered::compute_pipeline;
-use crate::shaders;
 
 /// What one of a program's buffers holds for each fragment. For a buffer named `light`, passes read and write it by
 ///
@@ -58,18 +57,22 @@ impl Content<'_> {
                 text,
                 "{slots}: array<vec4<f32>>;
                 fn {name}_load(fragment: Fragment, number: u32) -> vec4<f32> {{
-                    return {name}_slots[fragment.place * {count}u + min(number, {count}u - 1u)];
+                    return {name}_slots[fbuffer_address(fragment) * {count}u + min(number, {count}u - 1u)];
                 }}
                 fn {name}_store(fragment: Fragment, number: u32, value: vec4<f32>) {{
-                    {name}_slots[fragment.place * {count}u + min(number, {count}u - 1u)] = value;
+                    if fbuffer_keeps(fragment) {{
+                        {name}_slots[fbuffer_address(fragment) * {count}u + min(number, {count}u - 1u)] = value;
+                    }}
                 }}\n"
             ),
             Self::State { name: ty, declaration, .. } => write!(
                 text,
                 "{declaration}
                 {slots}: array<{ty}>;
-                fn {name}_load(fragment: Fragment) -> {ty} {{ return {name}_slots[fragment.place]; }}
-                fn {name}_store(fragment: Fragment, value: {ty}) {{ {name}_slots[fragment.place] = value; }}\n"
+                fn {name}_load(fragment: Fragment) -> {ty} {{ return {name}_slots[fbuffer_address(fragment)]; }}
+                fn {name}_store(fragment: Fragment, value: {ty}) {{
+                    if fbuffer_keeps(fragment) {{ {name}_slots[fbuffer_address(fragment)] = value; }}
+                }}\n"
             ),
         };
         debug_assert!(written.is_ok(), "strings take all");
@@ -85,6 +88,8 @@ fn is_identifier(name: &str) -> bool {
 #[derive(Debug)]
 pub struct Program {
     pub(super) pipelines: Vec<ComputePipeline>,
+    /// Where their intermediate results are.
+    pub(super) keeping: Keeping,
 }
 
 const ENTRY: &str = "fbuffer_pass";
@@ -118,11 +123,12 @@ impl FBuffer {
                     @builtin(num_workgroups) groups: vec3<u32>,
                     @builtin(local_invocation_index) lane: u32,
                 ) {{
-                    let fragment = fbuffer_fragment(group, groups, lane);
+                    let fragment = fbuffer_fragment(group, groups, lane, {});
                     if fragment.is_there {{ {body} }}
                 }}",
-                shaders::FBUFFER_MODULE,
+                self.keeping.module(),
                 self.buffers_wgsl(),
+                i == last,
             );
             let device = &self.gpu.device;
             let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -136,7 +142,8 @@ impl FBuffer {
                 Some(error) => Err(FBufferError::Pass { number: i + 1, detail: error.to_string() }),
             }
         };
-        Ok(Program { pipelines: passes.iter().enumerate().map(pipeline).collect::<Result<_, _>>()? })
+        let pipelines = passes.iter().enumerate().map(pipeline).collect::<Result<_, _>>()?;
+        Ok(Program { pipelines, keeping: self.keeping })
     }
 }
 

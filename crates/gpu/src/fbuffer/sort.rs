@@ -54,6 +54,11 @@ pub(crate) struct Step {
 
 /// The dispatches that sort a range of keys.
 pub(crate) fn sort_steps(keys: &std::ops::Range<u64>) -> Vec<Step> {
+    run_steps(keys, u64::MAX)
+}
+
+/// The dispatches that sort each run of so many keys, a power of two and [`BLOCK`] at least.
+pub(crate) fn run_steps(keys: &std::ops::Range<u64>, run: u64) -> Vec<Step> {
     let length = keys.end - keys.start;
     let step = |kind, groups, block: u64| {
         let stage = Stage { first: keys.start as u32, length: length as u32, block: block as u32 };
@@ -64,7 +69,9 @@ pub(crate) fn sort_steps(keys: &std::ops::Range<u64>) -> Vec<Step> {
     if length > 1 {
         steps.push(step(Kind::SortBlocks, blocks, BLOCK));
     }
-    for stage in stages(length) {
+    // Longer runs begin with a flip.
+    let stages = stages(length).take_while(|stage| !matches!(stage, NetworkStage::Flip(block) if *block > run));
+    for stage in stages {
         match stage {
             NetworkStage::Flip(block) if block > BLOCK => steps.push(step(Kind::Flip, pairs.div_ceil(LANES), block)),
             NetworkStage::Halve(block) if block > BLOCK => steps.push(step(Kind::Halve, pairs.div_ceil(LANES), block)),

@@ -1,5 +1,7 @@
 //! Where the last pass draws to. Twin: `shaders/fbuffer/output.wesl`.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use pellucid_core::Image;
@@ -17,17 +19,22 @@ use crate::{Context, shaders};
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct OutputData {
     width: u32,
-    length: u32,
+    first: u32,
+    end: u32,
     flags: u32,
     least_alpha: f32,
 }
 
+/// Slots that are sorted and blended at once. Fewer take more dispatches, more take more stages of the sort.
+pub(super) const RUN: u64 = 16_384;
+
 impl OutputData {
-    pub(super) fn new(output: Output, width: u32, length: u64) -> Self {
+    pub(super) fn new(output: Output, width: u32, slots: &Range<u64>) -> Self {
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         Self {
             width,
-            length: length as u32,
+            first: slots.start as u32,
+            end: slots.end as u32,
             flags: bit(output.depth_test, 1) | bit(output.depth_write, 2) | bit(output.blend, 4),
             least_alpha: output.alpha_test.unwrap_or(f32::MIN),
         }
@@ -89,6 +96,17 @@ pub(super) fn read<T: Pod>(
     Ok(bytemuck::pod_collect_to_vec(&mapped(gpu, &staging)?))
 }
 
+/// All slots, then those of each run.
+fn parts(fragments: u64) -> impl Iterator<Item = Range<u64>> {
+    let runs = (0..fragments).step_by(RUN as usize).map(move |first| first..(first + RUN).min(fragments));
+    std::iter::once(0..fragments).chain(runs)
+}
+
+/// Bytes from one part's data to the next.
+fn stride(gpu: &Context) -> usize {
+    size_of::<OutputData>().next_multiple_of(gpu.limits.min_storage_buffer_offset_alignment as usize)
+}
+
 /// Long-lived half of tests and blending.
 #[derive(Debug)]
 pub(super) struct OutputPass {
@@ -99,7 +117,12 @@ pub(super) struct OutputPass {
 
 impl OutputPass {
     pub(super) fn new(gpu: &Context) -> Self {
-        let entries = [0, 1, 2, 3, 4, 5].map(|binding| storage_entry(binding, ShaderStages::COMPUTE, binding == 0));
+        let mut entries = [0, 1, 2, 3, 4, 5].map(|binding| storage_entry(binding, ShaderStages::COMPUTE, binding == 0));
+        entries[0].ty = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: true },
+            has_dynamic_offset: true,
+            min_binding_size: None,
+        };
         let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("F-Buffer output"),
             entries: &entries,
@@ -109,13 +132,33 @@ impl OutputPass {
         Self { make_keys: pipeline("make_keys"), blend: pipeline("blend"), layout }
     }
 
+    /// Bytes of the data for so many fragments.
+    pub(super) fn data_bytes(gpu: &Context, fragments: u64) -> u64 {
+        (stride(gpu) * parts(fragments).count()) as u64
+    }
+
+    /// The data, as it is sent.
+    pub(super) fn data(gpu: &Context, output: Output, width: u32, fragments: u64) -> Vec<u8> {
+        let mut bytes = vec![0; stride(gpu) * parts(fragments).count()];
+        for (place, slots) in bytes.chunks_exact_mut(stride(gpu)).zip(parts(fragments)) {
+            let data = OutputData::new(output, width, &slots);
+            place[..size_of::<OutputData>()].copy_from_slice(bytemuck::bytes_of(&data));
+        }
+        bytes
+    }
+
     /// `buffers`: data, places, colours, keys.
     pub(super) fn group(&self, gpu: &Context, buffers: [&wgpu::Buffer; 4], target: &Target) -> wgpu::BindGroup {
         let [data, places, colors, keys] = buffers;
-        let entries: Vec<_> = (0..)
+        let mut entries: Vec<_> = (0..)
             .zip([data, places, colors, keys, &target.colors, &target.depths])
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
+        entries[0].resource = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: data,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<OutputData>() as u64),
+        });
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("F-Buffer output"),
             layout: &self.layout,
@@ -126,14 +169,22 @@ impl OutputPass {
     /// Before the sort.
     pub(super) fn make_keys(&self, pass: &mut wgpu::ComputePass<'_>, group: &wgpu::BindGroup, fragments: u64) {
         pass.set_pipeline(&self.make_keys);
-        pass.set_bind_group(0, group, &[]);
+        pass.set_bind_group(0, group, &[0]);
         dispatch(pass, fragments.div_ceil(LANES));
     }
 
-    /// After it.
-    pub(super) fn blend(&self, pass: &mut wgpu::ComputePass<'_>, group: &wgpu::BindGroup, fragments: u64) {
+    /// After it, run by run.
+    pub(super) fn blend(
+        &self,
+        gpu: &Context,
+        pass: &mut wgpu::ComputePass<'_>,
+        group: &wgpu::BindGroup,
+        fragments: u64,
+    ) {
         pass.set_pipeline(&self.blend);
-        pass.set_bind_group(0, group, &[]);
-        dispatch(pass, fragments.div_ceil(LANES));
+        for (number, slots) in parts(fragments).enumerate().skip(1) {
+            pass.set_bind_group(0, group, &[(stride(gpu) * number) as u32]);
+            dispatch(pass, (slots.end - slots.start).div_ceil(LANES));
+        }
     }
 }

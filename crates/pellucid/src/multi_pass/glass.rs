@@ -1,10 +1,11 @@
-//! Thin glass with pits, in three passes: what figure 3 of the F-Buffer paper shows. Twin, for the GPU: the passes of the
-//! example `pitted_glass` of `pellucid-gpu`.
+//! Thin glass with pits, in three passes: what figure 3 of the F-Buffer paper shows. Twin, which runs on the GPU: the passes
+//! of the example `pitted_glass` of `pellucid-gpu`.
 //!
 //! Everything is computed in the mesh's own space, in which the eye is where the last row of the clip matrix vanishes; so
 //! instances may be placed as they like.
 
 use glam::{Vec3, Vec4};
+use pellucid_core::primitive::Draw;
 use pellucid_cpu::fbuffer::{Fragment, Program, Verdict};
 
 /// Passes of the shader.
@@ -34,14 +35,14 @@ fn bump(fragment: &Fragment<'_>, slot: &mut Slot) -> Verdict {
     let depth = depth_at(Vec3::ZERO);
     let slope = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (depth_at(axis * STEP) - depth) / STEP);
     let bumped = (normal + Vec3::from(slope) * 0.06).normalize_or(normal);
-    let facing = if bumped.dot(eye(fragment) - position) < 0.0 { -bumped } else { bumped };
+    let facing = if bumped.dot(eye(fragment.draw) - position) < 0.0 { -bumped } else { bumped };
     slot.normal = facing.extend(depth);
     Verdict::Keep
 }
 
 /// Pass 2: where light comes from.
 fn refract(fragment: &Fragment<'_>, slot: &mut Slot) -> Verdict {
-    let sight = (position(fragment) - eye(fragment)).normalize_or(Vec3::NEG_Z);
+    let sight = (position(fragment) - eye(fragment.draw)).normalize_or(Vec3::NEG_Z);
     let normal = slot.normal.truncate();
     let cosine = (-sight.dot(normal)).clamp(0.0, 1.0);
     // Schlick's approximation, for glass in air.
@@ -124,7 +125,7 @@ fn normal(fragment: &Fragment<'_>) -> Vec3 {
 }
 
 /// The eye in the mesh's space; very far away for parallel rays.
-fn eye(fragment: &Fragment<'_>) -> Vec3 {
-    let eye = fragment.draw.clip_from_mesh.inverse() * Vec4::Z;
+pub(super) fn eye(draw: &Draw<'_>) -> Vec3 {
+    let eye = draw.clip_from_mesh.inverse() * Vec4::Z;
     if eye.w.abs() > 1e-20 { eye.truncate() / eye.w } else { eye.truncate() * 1e6 }
 }

@@ -5,18 +5,24 @@
 //! blending there is the technique `fbuffer`.
 
 mod glass;
+#[cfg(feature = "gpu")]
+mod gpu;
 
 use std::fmt;
 use std::str::FromStr;
+use std::time::Instant;
 
 use glam::Vec4;
 use pellucid_core::fbuffer::order::Geometry;
 use pellucid_core::fbuffer::{Drawn, Output, RasterOrder, Size, Windows};
 use pellucid_core::primitive::Pass;
+use pellucid_core::stats::Step;
 use pellucid_core::{Error, Image, Scene, View};
 use pellucid_cpu::fbuffer::{FBuffer, Program, Target, Verdict, draw_through_framebuffer};
 
 pub use glass::{PASSES as GLASS_PASSES, environment};
+#[cfg(feature = "gpu")]
+pub use gpu::GpuMultiPass;
 
 /// A shader of several passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -87,6 +93,16 @@ pub struct Picture {
     pub drawn: Drawn,
     /// Bytes that intermediate results took.
     pub bytes: u64,
+    /// Timed parts, in order: `geometry` (on the pixel grid, and its slots), `opaque` surfaces, `passes` with tests and
+    /// blending.
+    pub steps: Vec<Step>,
+}
+
+impl Picture {
+    /// All timed parts together, in milliseconds.
+    pub fn total_ms(&self) -> f64 {
+        self.steps.iter().map(|step| step.ms).sum()
+    }
 }
 
 /// Renders a view on the CPU: opaque surfaces first, lit in one pass, then transparent ones in draw order.
@@ -94,13 +110,19 @@ pub struct Picture {
 /// # Errors
 /// If the view is invalid.
 pub fn render(scene: &Scene, view: &View, shader: Shader, through: Through) -> Result<Picture, Error> {
+    let start = Instant::now();
     let mut target = opaque(scene, view)?;
+    let opaque = step("opaque", start);
+    let start = Instant::now();
     let order = order(scene, view)?;
+    let geometry = step("geometry", start);
+    let start = Instant::now();
     let (drawn, bytes) = match shader {
         Shader::Lighting => run(&order, &lighting(), through, &mut target),
         Shader::PittedGlass => run(&order, &glass::program(), through, &mut target),
     };
-    Ok(Picture { image: target.color, drawn, bytes })
+    let steps = vec![geometry, opaque, step("passes", start)];
+    Ok(Picture { image: target.color, drawn, bytes, steps })
 }
 
 /// The memory of an F-Buffer after its first window of a view, slot by slot and row by row: each holds the colour of its
@@ -126,7 +148,7 @@ pub fn slots(scene: &Scene, view: &View, shader: Shader, size: Size) -> Result<(
         }
     };
     for (pixel, color) in image.pixels_mut().iter_mut().zip(colors) {
-        *pixel = color + *pixel * (1.0 - color.w);
+        *pixel = over(color, *pixel);
     }
     Ok((image, windows))
 }
@@ -143,6 +165,14 @@ pub fn fragments(scene: &Scene, view: &View) -> Result<u64, Error> {
 pub fn differing_pixels(a: &Image, b: &Image) -> u64 {
     let pairs = a.pixels().iter().zip(b.pixels());
     pairs.filter(|(a, b)| (**a - **b).abs().max_element() > 1.0 / 512.0).count() as u64
+}
+
+fn over(color: Vec4, background: Vec4) -> Vec4 {
+    color + background * (1.0 - color.w)
+}
+
+fn step(name: &'static str, start: Instant) -> Step {
+    Step { name, ms: start.elapsed().as_secs_f64() * 1e3 }
 }
 
 fn order<'a>(scene: &'a Scene, view: &View) -> Result<RasterOrder<'a>, Error> {

@@ -268,6 +268,8 @@ struct Line<'a> {
     width: u32,
     height: u32,
     opacity: f32,
+    shader: Option<&'a str>,
+    fbuffer: Option<u32>,
     triangles: Option<u64>,
     fragments: Option<u64>,
     max_depth_complexity: Option<u32>,
@@ -287,6 +289,8 @@ struct Line<'a> {
     windows: Option<u32>,
     rerenders: Option<u32>,
     cut_pixels: Option<u64>,
+    slot_windows: Option<u64>,
+    submissions: Option<u64>,
     reason: Option<&'a str>,
 }
 
@@ -302,6 +306,8 @@ impl<'a> Line<'a> {
             width: point.width,
             height: point.height,
             opacity: point.opacity,
+            shader: point.shader.as_deref(),
+            fbuffer: point.fbuffer,
             triangles: point.triangles,
             fragments: point.fragments,
             max_depth_complexity: point.max_depth_complexity,
@@ -321,6 +327,8 @@ impl<'a> Line<'a> {
             windows: figures.map(|figures| figures.windows),
             rerenders: figures.map(|figures| figures.rerenders),
             cut_pixels: figures.map(|figures| figures.cut_pixels),
+            slot_windows: figures.and_then(|figures| figures.slot_windows),
+            submissions: figures.and_then(|figures| figures.submissions),
             reason: result.reason(),
         }
     }

@@ -107,6 +107,8 @@ fn exhibit(chapter: &Chapter, show: Show) -> Vec<Exhibit> {
         Show::Exponents => exponents(chapter),
         Show::Speedups => speedups(chapter),
         Show::Peers => peers(chapter),
+        Show::Submissions => submissions(chapter),
+        Show::Through => through(chapter),
     }
 }
 
@@ -177,11 +179,13 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 14] = [
+const STEP_ORDER: [&str; 16] = [
     "transform",
     "clip, setup and bin",
     "raster, sort, shade and resolve",
+    "geometry",
     "opaque",
+    "passes",
     "blend",
     "compose",
     "zero",
@@ -304,6 +308,62 @@ fn peers(chapter: &Chapter) -> Vec<Exhibit> {
     table.push(summary("least", &|column| column.iter().copied().min_by(f64::total_cmp)));
     let plot = Plot { values: "time over that of the CPU renderer".into(), is_log: true, form: Form::Rows { rows } };
     vec![Exhibit { title: "Time over that of the CPU renderer".into(), table, plot: Some(plot) }]
+}
+
+/// What an F-Buffer of each size takes: the same on any backend, and for any of the variants.
+fn submissions(chapter: &Chapter) -> Vec<Exhibit> {
+    let mut table = vec![heading(
+        "point",
+        ["fragments", "slots", "windows", "overflows", "passes over the geometry"].map(str::to_owned),
+    )];
+    for point in &chapter.results {
+        let through_fbuffer = point.results.iter().filter(|result| result.technique == "fbuffer");
+        let figures = through_fbuffer.filter_map(|result| result.figures()).next();
+        let counts = figures.and_then(|figures| Some((figures.slot_windows?, figures.submissions?)));
+        let (Some(fragments), Some(side), Some((windows, submissions))) = (point.fragments, point.fbuffer, counts)
+        else {
+            continue;
+        };
+        let cells = [
+            full_count(fragments),
+            format!("{side} x {side}"),
+            full_count(windows),
+            full_count(windows - 1),
+            full_count(submissions),
+        ];
+        table.push(heading(&point.label, cells));
+    }
+    let title = "Windows of slots, and how often geometry is drawn".into();
+    if table.len() < 2 { Vec::new() } else { vec![Exhibit { title, table, plot: None }] }
+}
+
+fn through(chapter: &Chapter) -> Vec<Exhibit> {
+    let passes_ms = |figures: &Figures| figures.steps.iter().find(|step| step.name == "passes").map(|step| step.ms);
+    let ratios = |point: &PointResult, backend: &str| -> [Option<f64>; 2] {
+        let of = |way: &str| point.figures(&format!("{backend} {way}"));
+        let (Some(ours), Some(plain)) = (of("fbuffer"), of("framebuffer")) else { return [None; 2] };
+        let passes = passes_ms(ours).zip(passes_ms(plain)).map(|(ours, plain)| ours / plain);
+        [Some(ours.median_ms / plain.median_ms), passes]
+    };
+    let backends = ["cpu", "gpu"];
+    let measured: Vec<&str> = backends
+        .into_iter()
+        .filter(|backend| chapter.results.iter().any(|point| ratios(point, backend)[0].is_some()))
+        .collect();
+    let columns: Vec<String> =
+        measured.iter().flat_map(|backend| [format!("{backend}, frame"), format!("{backend}, passes alone")]).collect();
+    let mut table = vec![heading("point", columns.iter().cloned())];
+    let mut rows = Vec::new();
+    for point in &chapter.results {
+        let values: Vec<Option<f64>> = measured.iter().flat_map(|backend| ratios(point, backend)).collect();
+        let cells = values.iter().map(|ratio| ratio.map_or_else(none, |ratio| format!("{ratio:.2} x")));
+        table.push(heading(&point.label, cells));
+        let named = columns.iter().cloned().zip(values).filter_map(|(name, value)| Some((name, value?)));
+        rows.push((point.label.clone(), named.collect::<Vec<_>>()));
+    }
+    let title = "Time through an F-Buffer over that through a framebuffer".to_owned();
+    let plot = Plot { values: title.to_lowercase(), is_log: false, form: Form::Rows { rows } };
+    if measured.is_empty() { Vec::new() } else { vec![Exhibit { title, table, plot: Some(plot) }] }
 }
 
 impl Chapter {

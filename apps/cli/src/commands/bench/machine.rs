@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, Storage};
-use pellucid::{Error, Renderer, Resolve, Scene, Stats, View};
+use pellucid::core::fbuffer::Size;
+use pellucid::gpu::{Context, ContextOptions, GpuError, GpuRenderer, Storage};
+use pellucid::multi_pass::{self, GpuMultiPass, Through};
+use pellucid::{Error, Renderer, Resolve, Scene, Stats, Technique, View};
 use serde::{Deserialize, Serialize};
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
-use super::suite::Suite;
-use super::variant::Variant;
+use super::results::Timed;
+use super::suite::{Shaded, Suite};
+use super::variant::{Passes, Variant};
 use crate::args::Backend;
 use crate::plan::BenchPlan;
 use crate::words::{memory, plural};
@@ -23,10 +26,11 @@ pub(super) struct Machine {
     gpu: Result<Gpu, String>,
 }
 
-/// One device, opened once for each storage that is used: pipelines differ.
+/// One device, opened once for each storage that is used, as pipelines differ, and once for shaders of several passes.
 struct Gpu {
     buffers: Option<GpuRenderer>,
     textures: Option<GpuRenderer>,
+    passes: Option<GpuMultiPass>,
     name: String,
     is_software: bool,
 }
@@ -76,13 +80,54 @@ impl Machine {
     }
 
     /// Renders a frame.
-    pub(super) fn render(&mut self, variant: Variant, scene: &Scene, view: &View) -> Result<Stats, Error> {
+    pub(super) fn render(
+        &mut self,
+        variant: Variant,
+        shaded: Option<Shaded>,
+        scene: &Scene,
+        view: &View,
+    ) -> Result<Timed, Error> {
+        if let (Some(passes), Some(shaded)) = (variant.passes, shaded) {
+            return self.run_passes(passes, shaded, scene, view);
+        }
         if variant.is_on_gpu() {
-            return Ok(self.gpu_for(variant)?.render(scene, view, Resolve::Blend, variant.technique)?.stats);
+            return Ok(self.gpu_for(variant)?.render(scene, view, Resolve::Blend, variant.technique)?.stats.into());
         }
         let threads = variant.threads.unwrap_or(self.threads);
         let cpu = self.cpu.entry(threads).or_insert_with(|| Renderer::new().threads(threads));
-        Ok(cpu.render(scene, view, Resolve::Blend)?.stats)
+        Ok(cpu.render(scene, view, Resolve::Blend)?.stats.into())
+    }
+
+    /// A frame by a shader of several passes, without reading it back.
+    fn run_passes(&mut self, passes: Passes, shaded: Shaded, scene: &Scene, view: &View) -> Result<Timed, Error> {
+        let through = match passes.is_through_fbuffer {
+            true => Through::FBuffer(Size::square(shaded.side)?),
+            false => Through::Framebuffer,
+        };
+        let (picture, device) = if passes.is_on_gpu {
+            let Ok(gpu) = &mut self.gpu else { return Err(GpuError::NoAdapter.into()) };
+            let renderer = match gpu.passes.take() {
+                Some(renderer) => renderer,
+                None => GpuMultiPass::new(Context::new(&options(true))?),
+            };
+            let renderer = gpu.passes.insert(renderer);
+            let picture = renderer.render(scene, view, shaded.shader, through)?;
+            (picture, renderer.context().name().to_owned())
+        } else {
+            // Its passes run one after the other, on one core.
+            (multi_pass::render(scene, view, shaded.shader, through)?, "CPU, 1 thread".to_owned())
+        };
+        let triangles = scene.instances().iter().map(|instance| scene.mesh(instance.mesh).triangles().len() as u64);
+        let stats = Stats {
+            triangles: triangles.sum(),
+            fragments: picture.drawn.fragments,
+            total_ms: picture.total_ms(),
+            peak_bytes: picture.bytes,
+            slot_windows: picture.drawn.windows,
+            steps: picture.steps,
+            ..Stats::new(Technique::FBuffer, device, view.width, view.height)
+        };
+        Ok(Timed { stats, drawn: Some(picture.drawn), is_exact: passes.is_through_fbuffer })
     }
 
     /// Gives back what renderers hold on to from frame to frame. A device that failed is opened anew.
@@ -91,7 +136,7 @@ impl Machine {
         if let Ok(gpu) = &mut self.gpu
             && gpu_too
         {
-            (gpu.buffers, gpu.textures) = (None, None);
+            (gpu.buffers, gpu.textures, gpu.passes) = (None, None, None);
         }
     }
 
@@ -148,7 +193,7 @@ impl Hardware {
 impl Gpu {
     fn new(buffers: GpuRenderer) -> Self {
         let (name, is_software) = (buffers.context().name().to_owned(), buffers.context().is_software());
-        Self { buffers: Some(buffers), textures: None, name, is_software }
+        Self { buffers: Some(buffers), textures: None, passes: None, name, is_software }
     }
 }
 
@@ -158,10 +203,13 @@ pub(super) fn cores() -> usize {
 }
 
 fn open_gpu(budget_bytes: Option<u64>, storage: Storage, allow_software: bool) -> Result<GpuRenderer, GpuError> {
-    let options = ContextOptions { allow_software, ..ContextOptions::default() };
-    let gpu = GpuRenderer::new(&options)?.storage(storage);
+    let gpu = GpuRenderer::new(&options(allow_software))?.storage(storage);
     Ok(match budget_bytes {
         Some(budget_bytes) => gpu.budget_bytes(budget_bytes),
         None => gpu,
     })
+}
+
+fn options(allow_software: bool) -> ContextOptions {
+    ContextOptions { allow_software, ..ContextOptions::default() }
 }

@@ -3,12 +3,12 @@
 
 use std::time::{Duration, Instant};
 
-use pellucid::{Error, Scene, Stats, View};
+use pellucid::{Error, Scene, View};
 
 use super::machine::Machine;
 use super::pace::Pace;
-use super::results::{Figures, Measurement, Outcome, PointResult};
-use super::suite::{Point, Series, Suite};
+use super::results::{Figures, Measurement, Outcome, PointResult, Timed};
+use super::suite::{Point, Series, Shaded, Suite};
 use super::variant::Variant;
 use crate::words::duration;
 
@@ -29,7 +29,8 @@ const LEAST_FRAMES: u32 = 3;
 /// A variant while it is measured.
 struct Candidate {
     variant: Variant,
-    frames: Vec<Stats>,
+    shaded: Option<Shaded>,
+    frames: Vec<Timed>,
     /// Of a frame, as last seen.
     ms: f64,
     spent: Duration,
@@ -67,7 +68,8 @@ pub(super) fn measure(
     pace: &mut Pace,
     result: &mut PointResult,
 ) {
-    let mut candidates: Vec<Candidate> = series.variants.iter().map(|&variant| Candidate::new(variant)).collect();
+    let mut candidates: Vec<Candidate> =
+        series.variants.iter().map(|&variant| Candidate::new(variant, point.shaded)).collect();
     for candidate in &mut candidates {
         let variant = candidate.variant;
         let predicted = pace.predict(variant, &point.work, point.pixels()).unwrap_or(0.0);
@@ -75,10 +77,10 @@ pub(super) fn measure(
             candidate.end = Some(Outcome::Skipped { reason });
         } else if effort.is_too_slow(predicted) {
             candidate.end = Some(effort.skipped(predicted, "would take some"));
-        } else if let Some(stats) = candidate.warm_up(machine, (scene, view), effort) {
-            result.learn(&stats);
-            if effort.is_too_slow(stats.total_ms) {
-                candidate.end = Some(effort.skipped(stats.total_ms, "took"));
+        } else if let Some(frame) = candidate.warm_up(machine, (scene, view), effort) {
+            result.learn(&frame);
+            if effort.is_too_slow(frame.stats.total_ms) {
+                candidate.end = Some(effort.skipped(frame.stats.total_ms, "took"));
             }
         }
     }
@@ -96,8 +98,8 @@ pub(super) fn measure(
                 if candidate.end.is_some() || !(candidate.frames.is_empty() || candidate.has_time(effort, 1)) {
                     break;
                 }
-                let stats = candidate.render(machine, scene, view);
-                candidate.frames.extend(stats);
+                let frame = candidate.render(machine, scene, view);
+                candidate.frames.extend(frame);
             }
         }
     }
@@ -118,19 +120,19 @@ fn share_of(repeats: u32, turn: u32) -> u32 {
 }
 
 impl Candidate {
-    fn new(variant: Variant) -> Self {
-        Self { variant, frames: Vec::new(), ms: 0.0, spent: Duration::ZERO, end: None }
+    fn new(variant: Variant, shaded: Option<Shaded>) -> Self {
+        Self { variant, shaded, frames: Vec::new(), ms: 0.0, spent: Duration::ZERO, end: None }
     }
 
     /// Renders a frame. `None`: it failed, and that is the end.
-    fn render(&mut self, machine: &mut Machine, scene: &Scene, view: &View) -> Option<Stats> {
+    fn render(&mut self, machine: &mut Machine, scene: &Scene, view: &View) -> Option<Timed> {
         let start = Instant::now();
-        let rendered: Result<Stats, Error> = machine.render(self.variant, scene, view);
+        let rendered: Result<Timed, Error> = machine.render(self.variant, self.shaded, scene, view);
         let took = start.elapsed();
         self.spent += took;
         self.ms = took.as_secs_f64() * 1e3;
         match rendered {
-            Ok(stats) => Some(stats),
+            Ok(frame) => Some(frame),
             Err(error) => {
                 self.end = Some(Outcome::Failed { reason: error.to_string() });
                 None
@@ -139,9 +141,9 @@ impl Candidate {
     }
 
     /// The first frame; if it was slow, another one where there is time: the first also compiles and allocates.
-    fn warm_up(&mut self, machine: &mut Machine, (scene, view): (&Scene, &View), effort: Effort) -> Option<Stats> {
+    fn warm_up(&mut self, machine: &mut Machine, (scene, view): (&Scene, &View), effort: Effort) -> Option<Timed> {
         let first = self.render(machine, scene, view)?;
-        if effort.is_too_slow(first.total_ms) && self.has_time(effort, 1) {
+        if effort.is_too_slow(first.stats.total_ms) && self.has_time(effort, 1) {
             return self.render(machine, scene, view);
         }
         Some(first)

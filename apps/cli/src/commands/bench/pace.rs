@@ -3,7 +3,7 @@
 
 use pellucid::Technique;
 
-use super::variant::Variant;
+use super::variant::{Passes, Variant};
 
 /// About how much there is to do at a point.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,14 @@ pub(super) struct Work {
 /// Milliseconds by technique and unit of work.
 #[derive(Debug, Default)]
 pub(super) struct Pace {
-    known: Vec<(Technique, f64)>,
+    known: Vec<(Kind, f64)>,
+}
+
+/// What has a pace of its own.
+type Kind = (Technique, Option<Passes>);
+
+fn kind(variant: Variant) -> Kind {
+    (variant.technique, variant.passes)
 }
 
 impl Work {
@@ -45,16 +52,16 @@ impl Work {
 impl Pace {
     /// Milliseconds that a frame will take, if there was one of the same technique.
     pub(super) fn predict(&self, variant: Variant, work: &Work, pixels: f64) -> Option<f64> {
-        let known = self.known.iter().find(|(technique, _)| *technique == variant.technique);
+        let known = self.known.iter().find(|(known, _)| *known == kind(variant));
         known.map(|(_, ms_per_unit)| ms_per_unit * work.units(variant, pixels))
     }
 
     /// Takes note of what a frame took.
     pub(super) fn learn(&mut self, variant: Variant, work: &Work, pixels: f64, ms: f64) {
         let rate = ms / work.units(variant, pixels);
-        match self.known.iter_mut().find(|(technique, _)| *technique == variant.technique) {
+        match self.known.iter_mut().find(|(known, _)| *known == kind(variant)) {
             Some((_, known)) => *known = rate,
-            None => self.known.push((variant.technique, rate)),
+            None => self.known.push((kind(variant), rate)),
         }
     }
 }

@@ -41,7 +41,10 @@ pub(super) fn draw(plot: &Plot, names: &[String]) -> anyhow::Result<(String, Vec
     let names: Vec<String> = match plot.form {
         // Steps are other things than variants.
         Form::Bars { .. } => shown.clone(),
-        Form::Lines { .. } | Form::Rows { .. } => names.to_vec(),
+        // What is no variant comes after them.
+        Form::Lines { .. } | Form::Rows { .. } => {
+            names.iter().chain(shown.iter().filter(|name| !names.contains(name))).cloned().collect()
+        }
     };
     let mut svg = String::new();
     {

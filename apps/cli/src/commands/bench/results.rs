@@ -1,12 +1,28 @@
 //! What was measured, as it is kept in the folder and written out.
 
 use pellucid::Stats;
+use pellucid::core::fbuffer::Drawn;
 use pellucid::gpu::Storage;
 use serde::{Deserialize, Serialize};
 
 use super::samples::Samples;
 use super::suite::Point;
 use super::variant::Variant;
+
+/// The figures of a frame.
+#[derive(Debug, Clone)]
+pub(super) struct Timed {
+    pub(super) stats: Stats,
+    /// Of a shader of several passes.
+    pub(super) drawn: Option<Drawn>,
+    pub(super) is_exact: bool,
+}
+
+impl From<Stats> for Timed {
+    fn from(stats: Stats) -> Self {
+        Self { drawn: None, is_exact: stats.is_exact(), stats }
+    }
+}
 
 /// A point with all that was measured there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +36,9 @@ pub(super) struct PointResult {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) opacity: f32,
+    /// Of several passes, and the slots along each side of its F-Buffer, where results are not of techniques.
+    pub(super) shader: Option<String>,
+    pub(super) fbuffer: Option<u32>,
     /// `None` if nothing was rendered.
     pub(super) triangles: Option<u64>,
     /// `None` if no exact technique was measured.
@@ -84,6 +103,10 @@ pub(super) struct Figures {
     pub(super) rerenders: u32,
     /// Pixels with more layers than were peeled.
     pub(super) cut_pixels: u64,
+    /// Windows of slots, of shaders of several passes.
+    pub(super) slot_windows: Option<u64>,
+    /// How often they drew the geometry.
+    pub(super) submissions: Option<u64>,
     /// Each frame, in the order of measuring.
     pub(super) samples_ms: Vec<f64>,
 }
@@ -106,6 +129,8 @@ impl PointResult {
             width,
             height,
             opacity: point.opacity,
+            shader: point.shaded.map(|shaded| shaded.shader.to_string()),
+            fbuffer: point.shaded.map(|shaded| shaded.side),
             triangles: None,
             fragments: None,
             max_depth_complexity: None,
@@ -115,9 +140,12 @@ impl PointResult {
     }
 
     /// Takes over what any frame tells of the scene: fragments only if all were captured.
-    pub(super) fn learn(&mut self, stats: &Stats) {
+    pub(super) fn learn(&mut self, frame: &Timed) {
+        let stats = &frame.stats;
         self.triangles = Some(stats.triangles);
-        if stats.is_exact() {
+        if frame.drawn.is_some() {
+            self.fragments = Some(stats.fragments);
+        } else if stats.is_exact() {
             self.fragments = Some(stats.fragments);
             self.max_depth_complexity = Some(stats.max_depth_complexity);
             self.mean_depth_complexity = Some(stats.mean_depth_complexity);
@@ -150,8 +178,8 @@ impl Measurement {
         let is_textures = variant.storage == Storage::Texture;
         Self {
             name: variant.name(),
-            technique: variant.technique.name().to_owned(),
-            backend: variant.technique.backend().to_owned(),
+            technique: variant.passes.map_or(variant.technique.name(), |passes| passes.through()).to_owned(),
+            backend: variant.backend().to_owned(),
             threads: variant.threads,
             storage: (variant.technique == pellucid::Technique::ABuffer)
                 .then(|| if is_textures { "texture" } else { "buffer" }.to_owned()),
@@ -179,20 +207,21 @@ impl Measurement {
 
 impl Figures {
     /// Of one frame or more.
-    pub(super) fn new(frames: &[Stats]) -> Option<Self> {
-        let last = frames.last()?;
+    pub(super) fn new(frames: &[Timed]) -> Option<Self> {
+        let Timed { stats: last, drawn, is_exact } = frames.last()?;
+        let frames: Vec<&Stats> = frames.iter().map(|frame| &frame.stats).collect();
         // Nanoseconds are finer than any clock that matters here.
         let samples_ms: Vec<f64> = frames.iter().map(|stats| (stats.total_ms * 1e6).round() / 1e6).collect();
         let times = Samples::new(samples_ms.clone())?;
         // A frame that had to be repeated has steps that others have not.
         let median_of = |name: &str| {
             let of_frame =
-                |stats: &Stats| stats.steps.iter().filter(|step| step.name == name).map(|step| step.ms).sum();
+                |stats: &&Stats| stats.steps.iter().filter(|step| step.name == name).map(|step| step.ms).sum();
             Samples::new(frames.iter().map(of_frame).collect()).map_or(0.0, |samples| samples.median())
         };
         Some(Self {
             device: last.device.clone(),
-            exact: last.is_exact(),
+            exact: *is_exact,
             frames: frames.len(),
             median_ms: times.median(),
             lower_ms: times.quantile(0.25),
@@ -209,6 +238,8 @@ impl Figures {
             windows: last.windows,
             rerenders: last.rerenders,
             cut_pixels: last.cut_pixels,
+            slot_windows: drawn.map(|drawn| drawn.windows),
+            submissions: drawn.map(|drawn| drawn.submissions),
             samples_ms,
         })
     }

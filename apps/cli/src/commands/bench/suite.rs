@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
+use pellucid::multi_pass::Shader;
 use serde::Serialize;
 
 use super::pace::Work;
@@ -74,6 +75,10 @@ pub(super) enum Show {
     Speedups,
     /// How much faster the CPU renderer is than techniques on the GPU, with geometric means.
     Peers,
+    /// Windows of F-Buffers, and how often geometry is drawn for them.
+    Submissions,
+    /// Times through F-Buffers over those through framebuffers.
+    Through,
 }
 
 /// A scene from a view.
@@ -85,10 +90,19 @@ pub(super) struct Point {
     pub(super) look: CameraPlan,
     pub(super) size: (u32, u32),
     pub(super) opacity: f32,
+    /// What is run there by variants that are no technique.
+    pub(super) shaded: Option<Shaded>,
     /// Where it lies on the axis of its series.
     pub(super) x: Option<f64>,
     /// About how much there is to do.
     pub(super) work: Work,
+}
+
+/// A shader of several passes, and the slots along each side of its F-Buffer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shaded {
+    pub(super) shader: Shader,
+    pub(super) side: u32,
 }
 
 /// Where a scene comes from.
@@ -152,7 +166,7 @@ impl Point {
     /// A scene as it is, seen as a whole, at 1280 x 720 pixels.
     pub(super) fn new(label: impl Into<String>, source: Source, work: Work) -> Self {
         let (look, size) = (CameraPlan::default(), (1280, 720));
-        Self { label: label.into(), source, look, size, opacity: 1.0, x: None, work }
+        Self { label: label.into(), source, look, size, opacity: 1.0, shaded: None, x: None, work }
     }
 
     pub(super) fn size(mut self, width: u32, height: u32) -> Self {
@@ -162,6 +176,11 @@ impl Point {
 
     pub(super) fn opacity(mut self, opacity: f32) -> Self {
         self.opacity = opacity;
+        self
+    }
+
+    pub(super) fn shaded(mut self, shader: Shader, side: u32) -> Self {
+        self.shaded = Some(Shaded { shader, side });
         self
     }
 

@@ -7,6 +7,8 @@ use pellucid::gpu::Storage;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Variant {
     pub(super) technique: Technique,
+    /// In place of a technique, the shader of several passes that a point has.
+    pub(super) passes: Option<Passes>,
     /// Of the CPU renderer; `None`: as many as the plan says.
     pub(super) threads: Option<usize>,
     /// Of the A-buffer.
@@ -17,10 +19,29 @@ pub(super) struct Variant {
     pub(super) presort: bool,
 }
 
+/// How a shader of several passes is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Passes {
+    /// Whether intermediate results are kept for each fragment, rather than for each pixel.
+    pub(super) is_through_fbuffer: bool,
+    pub(super) is_on_gpu: bool,
+}
+
+impl Passes {
+    pub(super) fn backend(self) -> &'static str {
+        if self.is_on_gpu { "gpu" } else { "cpu" }
+    }
+
+    /// Where intermediate results are kept, as `--through` has it.
+    pub(super) fn through(self) -> &'static str {
+        if self.is_through_fbuffer { "fbuffer" } else { "framebuffer" }
+    }
+}
+
 impl Variant {
     /// A technique as it usually is.
     pub(super) fn of(technique: Technique) -> Self {
-        Self { technique, threads: None, storage: Storage::Buffer, max_layers: None, presort: false }
+        Self { technique, passes: None, threads: None, storage: Storage::Buffer, max_layers: None, presort: false }
     }
 
     pub(super) fn threads(threads: usize) -> Self {
@@ -41,14 +62,24 @@ impl Variant {
         Self { presort: true, ..Self::of(technique) }
     }
 
+    /// A shader of several passes.
+    pub(super) fn passes(passes: Passes) -> Self {
+        Self { passes: Some(passes), ..Self::of(Technique::FBuffer) }
+    }
+
+    pub(super) fn backend(self) -> &'static str {
+        self.passes.map_or(self.technique.backend(), Passes::backend)
+    }
+
     pub(super) fn is_on_gpu(self) -> bool {
-        self.technique.backend() == "gpu"
+        self.backend() == "gpu"
     }
 
     /// As in tables: `peel (4 layers)`.
     pub(super) fn name(self) -> String {
         let name = self.technique.name();
         match self {
+            Self { passes: Some(passes), .. } => format!("{} {}", passes.backend(), passes.through()),
             Self { max_layers: Some(layers), .. } => format!("{name} ({layers} layers)"),
             Self { threads: Some(1), .. } => format!("{name} (1 thread)"),
             Self { threads: Some(threads), .. } => format!("{name} ({threads} threads)"),

@@ -1,6 +1,7 @@
 //! The suites, one file each. To add one, add a file and its entry in [`SUITES`].
 
 mod abuffer;
+mod fbuffer;
 mod lfb;
 mod peel;
 mod peers;
@@ -9,7 +10,8 @@ mod scale;
 use super::suite::Suite;
 
 /// All there are, in the order in which they are measured.
-pub(crate) const SUITES: &[Suite] = &[lfb::SUITE, peel::SUITE, abuffer::SUITE, scale::SUITE, peers::SUITE];
+pub(crate) const SUITES: &[Suite] =
+    &[lfb::SUITE, peel::SUITE, abuffer::SUITE, fbuffer::SUITE, scale::SUITE, peers::SUITE];
 
 /// The dragon of the LFB chapter's figure 20.7, or as many triangles.
 const DRAGON: super::suite::Source =
