@@ -122,8 +122,7 @@ impl Order {
         totals.covered_pixels = covered as u64;
         let mut first_row = 0;
         for samples in by_class[..covered].chunks(STRIP) {
-            let mut strip =
-                Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
+            let mut strip = Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
             for (lane, &sample) in samples.iter().enumerate() {
                 strip.samples[lane] = sample;
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);

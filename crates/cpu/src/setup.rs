@@ -137,14 +137,7 @@ impl Chunk {
     }
 
     #[inline(always)]
-    fn set_up<S: Simd>(
-        &mut self,
-        simd: S,
-        span: &Span,
-        draw: &Draw<'_>,
-        vertices: DrawVertices<'_>,
-        grid: &TileGrid,
-    ) {
+    fn set_up<S: Simd>(&mut self, simd: S, span: &Span, draw: &Draw<'_>, vertices: DrawVertices<'_>, grid: &TileGrid) {
         let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
         let mut small = SmallTriangles::default();
         let mut corners = [[[0; 2]; LANES]; 3];
@@ -233,13 +226,7 @@ impl Chunk {
     }
 
     #[cold]
-    fn set_up_clipped(
-        &mut self,
-        draw_number: usize,
-        draw: &Draw<'_>,
-        triangle: usize,
-        grid: &TileGrid,
-    ) {
+    fn set_up_clipped(&mut self, draw_number: usize, draw: &Draw<'_>, triangle: usize, grid: &TileGrid) {
         for piece in draw.pieces(triangle, &grid.viewport).unwrap_or_default() {
             let kind = match piece.corners {
                 Corners::Whole { swapped: false } => RecordCorners::Whole,

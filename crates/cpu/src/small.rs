@@ -63,13 +63,7 @@ pub(crate) struct SmallTriangles {
 impl SmallTriangles {
     /// Adds a triangle; returns whether there are sixteen.
     #[inline(always)]
-    pub(crate) fn push(
-        &mut self,
-        triangle: usize,
-        corners: [u32; 3],
-        [left, top]: [i32; 2],
-        covered: u64,
-    ) -> bool {
+    pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {
         let lane = self.count;
         self.corners[lane] = corners;
         self.triangles[lane] = triangle as u32;

@@ -316,10 +316,12 @@ impl TileCapture {
                 Some(Fragment { color, depth: fragment.depth, primitive: fragment.primitive })
             }));
             layers.ends.push(layers.fragments.len() as u32);
-            layers.opaque.push(self.opaque_color(sample, x, y, frame).map(|color| OpaqueSurface {
-                color,
-                depth: f32::from_bits((self.opaque_keys[sample] >> 32) as u32),
-            }));
+            layers.opaque.push(
+                self.opaque_color(sample, x, y, frame).map(|color| OpaqueSurface {
+                    color,
+                    depth: f32::from_bits((self.opaque_keys[sample] >> 32) as u32),
+                }),
+            );
         }
     }
 
