@@ -51,7 +51,7 @@ impl Sight {
         let swapped = area.simd_lt(0);
         let mut small = hit & is_small & !area.simd_eq(0);
         if draw.culls_back_faces {
-            small = small & if draw.mirrored { !swapped } else { swapped };
+            small &= if draw.mirrored { !swapped } else { swapped };
         }
         let mut sight = Self {
             small: small.to_bitmask() as u32,
@@ -89,16 +89,16 @@ impl Sight {
             let (mut a_here, mut b_here, mut c_here) = (a, b, c);
             let mut covered = zero;
             for _ in 0..columns {
-                covered = covered | (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
-                bit = bit << 1;
+                covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+                bit <<= 1;
                 (a_here, b_here, c_here) = (a_here + a_dx, b_here + b_dx, c_here + c_dx);
             }
             let half = &mut halves[usize::from(row >= 4)];
-            *half = *half | covered;
+            *half |= covered;
             (a, b, c) = (a + a_dy, b + b_dy, c + c_dy);
         }
         let [low, high] = halves;
-        small = small & !(low | high).simd_eq(0);
+        small &= !(low | high).simd_eq(0);
         sight.small = small.to_bitmask() as u32;
         (sight.low_rows, sight.high_rows) = (low.into(), high.into());
         sight
