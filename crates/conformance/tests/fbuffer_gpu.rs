@@ -207,7 +207,7 @@ fn passes_that_carry_values_change_no_bit_at_any_size() {
 fn large_windows_blend_as_small_ones_do() {
     let Some(device) = device() else { return };
     let scene = pellucid::load("@boxes:n=4").unwrap().scene;
-    let view = View::of(&scene).size(160, 120).opacity(0.5);
+    let view = View::of(&scene).size(200, 150).opacity(0.5);
     let text = format!("{LOOK} fn shade(fragment: Fragment) -> vec4<f32> {{ return look(fragment); }}");
     let [large, small] =
         [256, 64].map(|side| picture(&mut buffer(&device, Size::square(side).unwrap(), &[]), &scene, &view, &[&text]));
