@@ -202,6 +202,21 @@ fn passes_that_carry_values_change_no_bit_at_any_size() {
     }
 }
 
+/// Sorted and blended in runs of 16,384 slots, the last of which is not full.
+#[test]
+fn large_windows_blend_as_small_ones_do() {
+    let Some(device) = device() else { return };
+    let scene = pellucid::load("@boxes:n=4").unwrap().scene;
+    let view = View::of(&scene).size(200, 150).opacity(0.5);
+    let text = format!("{LOOK} fn shade(fragment: Fragment) -> vec4<f32> {{ return look(fragment); }}");
+    let [large, small] =
+        [256, 64].map(|side| picture(&mut buffer(&device, Size::square(side).unwrap(), &[]), &scene, &view, &[&text]));
+    let fragments = large.1.fragments;
+    assert!(fragments > 2 * 16_384 && !fragments.is_multiple_of(16_384), "{fragments}");
+    assert_eq!((large.1.windows, small.1.windows), (1, fragments.div_ceil(4096)));
+    assert!(large.0 == small.0);
+}
+
 #[test]
 fn kills_and_masks_lead_no_later_pass_astray() {
     let Some(device) = device() else { return };

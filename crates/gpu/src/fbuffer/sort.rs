@@ -217,3 +217,23 @@ pub fn sort_keys(
     let words: Vec<[u32; 3]> = read(&gpu, &buffers[0], 0, total)?;
     Ok(words.into_iter().map(|[pixel, depth, slot]| Key { pixel, depth, slot }).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run that is not sorted to its end is blended by several invocations at once, which a software device may happen to
+    /// do in the right order: pictures do not show it.
+    #[test]
+    fn runs_go_through_all_stages_of_their_own_length_and_no_more() {
+        let of = |steps: Vec<Step>| steps.iter().map(|step| (step.kind, step.stage.block)).collect::<Vec<_>>();
+        for run in [BLOCK, 1024, super::super::target::RUN] {
+            let alone = of(sort_steps(&(0..run)));
+            for length in [run, run + 1, 3 * run - 7, 8 * run] {
+                let steps = run_steps(&(0..length), run);
+                assert!(steps.iter().all(|step| u64::from(step.stage.length) == length));
+                assert_eq!(of(steps), alone, "runs of {run} in {length} keys");
+            }
+        }
+    }
+}
