@@ -1,15 +1,11 @@
-//! Triangles to what tiles need: small ones to fragments, others to records; what is out of sight or covers no sample is
-//! left out, sixteen triangles at a time, before more than its position on the screen is read.
+//! Triangles to records: what is in sight and may cover a sample, ready for the tiles.
 
-use fearless_simd::Simd;
-use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, outcode, twice_signed_area};
+use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, outcode, twice_signed_area};
 use pellucid_core::primitive::{Corners, Draw, Fold, Pass, Piece};
 use pellucid_core::shading::CornerNormals;
 
 use crate::bin::{Bins, TileGrid};
-use crate::sight::Sight;
-use crate::small::{LANES, SmallFragments, SmallTriangles};
-use crate::transform::{DrawVertices, outcode};
+use crate::transform;
 
 /// A triangle in sight, or a piece of a clipped one.
 #[derive(Debug, Clone, Copy)]
@@ -39,38 +35,9 @@ enum RecordCorners {
 pub(crate) struct Chunk {
     records: Vec<Record>,
     clipped: Vec<[glam::Vec3; 3]>,
-    pub(crate) opaque: PassBins,
-    pub(crate) transparent: PassBins,
+    pub(crate) opaque: Bins,
+    pub(crate) transparent: Bins,
     pub(crate) dropped_triangles: u64,
-}
-
-/// What a chunk has for the tiles, in one pass of the frame. Draw order runs through both.
-#[derive(Debug, Default)]
-pub(crate) struct PassBins {
-    pub(crate) records: Bins,
-    pub(crate) small: SmallFragments,
-}
-
-impl PassBins {
-    fn begin(&mut self) {
-        self.records.begin();
-        self.small.begin();
-    }
-
-    fn finish(&mut self, grid: &TileGrid) {
-        self.records.finish(grid);
-        self.small.finish(grid);
-    }
-
-    /// Adds how much each tile has to do.
-    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
-        self.records.add_counts(counts);
-        self.small.add_counts(counts);
-    }
-
-    fn bytes(&self) -> usize {
-        self.records.bytes() + self.small.bytes()
-    }
 }
 
 /// Triangles of one draw that a chunk sets up.
@@ -114,14 +81,14 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span
 }
 
 impl Chunk {
-    /// Sets up the triangles of `spans`; `draw_vertices` gives the transformed vertices of a draw.
+    /// Sets up the triangles of `spans`; `screen_vertices` gives the transformed vertices of a draw.
     #[inline(always)]
-    pub(crate) fn fill<'v, S: Simd>(
+    pub(crate) fn fill<'v>(
         &mut self,
-        simd: S,
         spans: &[Span],
         draws: &[Draw<'_>],
-        draw_vertices: impl Fn(usize) -> DrawVertices<'v>,
+        screen_vertices: impl Fn(usize) -> &'v [ScreenVertex],
+        viewport: &Viewport,
         grid: &TileGrid,
     ) {
         self.records.clear();
@@ -130,104 +97,58 @@ impl Chunk {
         self.opaque.begin();
         self.transparent.begin();
         for span in spans {
-            self.set_up(simd, span, &draws[span.draw], draw_vertices(span.draw), grid);
+            self.set_up(span, &draws[span.draw], screen_vertices(span.draw), viewport, grid);
         }
         self.opaque.finish(grid);
         self.transparent.finish(grid);
     }
 
     #[inline(always)]
-    fn set_up<S: Simd>(&mut self, simd: S, span: &Span, draw: &Draw<'_>, vertices: DrawVertices<'_>, grid: &TileGrid) {
+    fn set_up(
+        &mut self,
+        span: &Span,
+        draw: &Draw<'_>,
+        vertices: &[ScreenVertex],
+        viewport: &Viewport,
+        grid: &TileGrid,
+    ) {
         let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
-        let mut small = SmallTriangles::default();
-        let mut corners = [[[0; 2]; LANES]; 3];
-        for (first, triangles) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)) {
-            if triangles.len() < LANES {
-                // Triangles without area, which are never in sight.
-                corners = [[[0; 2]; LANES]; 3];
-            }
-            for (lane, indices) in triangles.iter().enumerate() {
-                for (corners, &vertex) in corners.iter_mut().zip(indices) {
-                    corners[lane] = vertices.positions[vertex as usize];
+        for (triangle, indices) in (span.first..).zip(triangles) {
+            let mut corners = indices.map(|vertex| vertices[vertex as usize]);
+            let codes = [0, 1, 2].map(|i| transform::outcode(&corners[i]));
+            let any = codes[0] | codes[1] | codes[2];
+            if any != 0 {
+                if any & outcode::NOT_FINITE != 0 {
+                    self.dropped_triangles += 1;
+                } else if codes[0] & codes[1] & codes[2] == 0 {
+                    self.set_up_clipped(span.draw, draw, triangle, viewport, grid);
                 }
+                continue;
             }
-            let sight = Sight::new(simd, &corners, draw, grid);
-            let mut records = sight.others;
-            if draw.varies() {
-                records |= sight.small;
+            let area = twice_signed_area(corners);
+            if area == 0 || !draw.shows_side(area) {
+                continue;
+            }
+            let kind = if area < 0 {
+                corners.swap(1, 2);
+                RecordCorners::Swapped
             } else {
-                let mut lanes = sight.small;
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    lanes &= lanes - 1;
-                    let covered = sight.covered(lane);
-                    if covered == 0 {
-                        continue;
-                    }
-                    let [a, b, c] = triangles[lane];
-                    let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
-                    if small.push(first + lane, corners, [sight.left[lane], sight.top[lane]], covered) {
-                        let bins = self.bins(draw.pass);
-                        small.flush(simd, draw, span.draw as u32, vertices, grid, &mut bins.small);
-                    }
-                }
-            }
-            while records != 0 {
-                let lane = records.trailing_zeros() as usize;
-                records &= records - 1;
-                self.set_up_record(span.draw, draw, first + lane, triangles[lane], vertices, grid);
-            }
-        }
-        let bins = self.bins(draw.pass);
-        small.flush(simd, draw, span.draw as u32, vertices, grid, &mut bins.small);
-    }
-
-    #[inline(always)]
-    fn bins(&mut self, pass: Pass) -> &mut PassBins {
-        match pass {
-            Pass::Opaque => &mut self.opaque,
-            Pass::Transparent => &mut self.transparent,
+                RecordCorners::Whole
+            };
+            self.push(span.draw, draw, triangle, corners, kind, Fold::None, grid);
         }
     }
 
-    /// Sets up a triangle that is not small, or whose colour varies.
-    #[inline(never)]
-    fn set_up_record(
+    #[cold]
+    fn set_up_clipped(
         &mut self,
         draw_number: usize,
         draw: &Draw<'_>,
         triangle: usize,
-        indices: [u32; 3],
-        vertices: DrawVertices<'_>,
+        viewport: &Viewport,
         grid: &TileGrid,
     ) {
-        let codes = indices.map(|vertex| outcode(vertices.positions[vertex as usize]));
-        let any = codes[0] | codes[1] | codes[2];
-        if any != 0 {
-            if any & outcode::NOT_FINITE != 0 {
-                self.dropped_triangles += 1;
-            } else if codes[0] & codes[1] & codes[2] == 0 {
-                self.set_up_clipped(draw_number, draw, triangle, grid);
-            }
-            return;
-        }
-        let mut corners = indices.map(|vertex| vertices.vertex(vertex));
-        let area = twice_signed_area(corners);
-        if area == 0 || !draw.shows_side(area) {
-            return;
-        }
-        let kind = if area < 0 {
-            corners.swap(1, 2);
-            RecordCorners::Swapped
-        } else {
-            RecordCorners::Whole
-        };
-        self.push(draw_number, draw, triangle, corners, kind, Fold::None, grid);
-    }
-
-    #[cold]
-    fn set_up_clipped(&mut self, draw_number: usize, draw: &Draw<'_>, triangle: usize, grid: &TileGrid) {
-        for piece in draw.pieces(triangle, &grid.viewport).unwrap_or_default() {
+        for piece in draw.pieces(triangle, viewport).unwrap_or_default() {
             let kind = match piece.corners {
                 Corners::Whole { swapped: false } => RecordCorners::Whole,
                 Corners::Whole { swapped: true } => RecordCorners::Swapped,
@@ -255,8 +176,11 @@ impl Chunk {
         if samples.is_single() && !covers(&vertices, samples.left, samples.top) {
             return;
         }
-        let number = self.records.len() as u32;
-        self.bins(draw.pass).records.add(number, &vertices, samples, grid);
+        let bins = match draw.pass {
+            Pass::Opaque => &mut self.opaque,
+            Pass::Transparent => &mut self.transparent,
+        };
+        bins.add(self.records.len() as u32, &vertices, samples, grid);
         let normals = CornerNormals::new(draw, triangle, &vertices, &self.corners(corners));
         self.records.push(Record {
             vertices,
