@@ -34,13 +34,7 @@ impl TileCapture {
     }
 
     #[inline(always)]
-    fn blend_simd<S: Simd>(
-        &self,
-        simd: S,
-        frame: FrameParts<'_>,
-        background: Vec4,
-        pixels: &mut [Vec4; TILE_SAMPLES],
-    ) {
+    fn blend_simd<S: Simd>(&self, simd: S, frame: FrameParts<'_>, background: Vec4, pixels: &mut [Vec4; TILE_SAMPLES]) {
         pixels.fill(background);
         if self.has_opaque {
             for (sample, x, y) in self.pixels() {
@@ -65,11 +59,10 @@ impl TileCapture {
     #[inline(always)]
     fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>) -> StripComposite<S> {
         let zero = f32x8::splat(simd, 0.0);
-        let mut blended =
-            StripComposite { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) };
+        let mut blended = StripComposite { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) };
         let (lights, sources) = self.fragments.lights_and_sources();
         for row in self.order.rows(strip) {
-            let numbers = row.map(|key| key as u32 as usize);
+            let numbers = row.0.map(|key| key as u32 as usize);
             let mut layer = [[0.0; STRIP]; 4];
             let transmittance: [f32; STRIP] = blended.transmittance.into();
             for (lane, &number) in numbers.iter().enumerate() {

@@ -9,7 +9,7 @@
 //! contract's order key. Keys are positive and look like f64 numbers of the same order, and of those every SIMD level has
 //! maximum and minimum.
 
-use fearless_simd::{Bytes, Simd, SimdBase, SimdMask, f64x8, u64x8};
+use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, f64x8, u64x8};
 
 use crate::fragments::Fragments;
 use crate::tile::{FragmentCounts, TILE_SAMPLES};
@@ -18,7 +18,7 @@ use crate::tile::{FragmentCounts, TILE_SAMPLES};
 pub(crate) const STRIP: usize = 8;
 
 /// Rows that a network sorts in registers.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 
 /// The order of a tile's fragments.
 #[derive(Debug)]
@@ -28,8 +28,13 @@ pub(crate) struct Order {
     firsts: Vec<u32>,
     pub(crate) strips: Vec<Strip>,
     /// Rows of all strips. Where a pixel has fewer fragments than its strip has rows, the last ones are 0.
-    keys: Vec<[u64; STRIP]>,
+    keys: Vec<Row>,
 }
+
+/// A key of each of a strip's pixels. One cache line, so that no vector lies in two.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(crate) struct Row(pub(crate) [u64; STRIP]);
 
 /// Eight pixels of about equally many fragments.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +66,7 @@ fn class(count: u32) -> usize {
 
 impl Order {
     /// Orders the fragments of a tile.
-    #[inline(always)]
-    pub(crate) fn sort<S: Simd>(&mut self, simd: S, fragments: &Fragments) -> FragmentCounts {
+    pub(crate) fn sort(&mut self, level: Level, fragments: &Fragments) -> FragmentCounts {
         self.strips.clear();
         self.counts.fill(0);
         let mut totals = FragmentCounts { fragments: fragments.len() as u64, ..FragmentCounts::default() };
@@ -76,17 +80,23 @@ impl Order {
         }
         let row_count = self.make_strips(&mut totals);
         if self.keys.len() < row_count {
-            self.keys.resize(row_count.next_power_of_two(), [0; STRIP]);
+            self.keys.resize(row_count.next_power_of_two(), Row::default());
         }
         let rows = &mut self.keys[..row_count];
-        rows.fill([0; STRIP]);
-        let keys = rows.as_flattened_mut();
+        rows.fill(Row::default());
         let next: &mut [u32; TILE_SAMPLES] = (&mut self.firsts[..]).try_into().unwrap_or_else(|_| unreachable!());
         for (number, (&sample, &depth)) in samples.iter().zip(depths).enumerate().skip(1) {
             let place = &mut next[sample as usize % TILE_SAMPLES];
-            keys[*place as usize] = u64::from(depth.to_bits()) << 32 | number as u64;
+            let (row, lane) = (*place as usize / STRIP, *place as usize % STRIP);
+            rows[row].0[lane] = u64::from(depth.to_bits()) << 32 | number as u64;
             *place += STRIP as u32;
         }
+        dispatch!(level, simd => self.sort_strips(simd));
+        totals
+    }
+
+    #[inline(always)]
+    fn sort_strips<S: Simd>(&mut self, simd: S) {
         for strip in &self.strips {
             let (first, count) = (strip.first_row as usize, strip.row_count as usize);
             for (lane, &sample) in strip.samples[..strip.sample_count as usize].iter().enumerate() {
@@ -94,11 +104,9 @@ impl Order {
             }
             sort_rows(simd, &mut self.keys[first..first + count]);
         }
-        totals
     }
 
     /// Puts the samples that have fragments together into strips; returns how many rows these have.
-    #[inline(always)]
     fn make_strips(&mut self, totals: &mut FragmentCounts) -> usize {
         let mut starts = [0u16; CLASSES];
         for &count in &self.counts {
@@ -122,8 +130,7 @@ impl Order {
         totals.covered_pixels = covered as u64;
         let mut first_row = 0;
         for samples in by_class[..covered].chunks(STRIP) {
-            let mut strip =
-                Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
+            let mut strip = Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
             for (lane, &sample) in samples.iter().enumerate() {
                 strip.samples[lane] = sample;
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);
@@ -138,131 +145,119 @@ impl Order {
 
     /// The rows of a strip: in each the number of a fragment of every pixel in the low half of a key, 0 for none.
     #[inline(always)]
-    pub(crate) fn rows(&self, strip: &Strip) -> &[[u64; STRIP]] {
+    pub(crate) fn rows(&self, strip: &Strip) -> &[Row] {
         &self.keys[strip.first_row as usize..(strip.first_row + strip.row_count) as usize]
     }
 
     /// The numbers of a sample's fragments, nearest first.
     pub(crate) fn of_sample(&self, sample: usize) -> impl Iterator<Item = u32> {
         let (first, count) = (self.firsts[sample] as usize, self.counts[sample] as usize);
-        let keys = self.keys.as_flattened();
-        (0..count).map(move |row| keys[first + row * STRIP] as u32)
+        let (first, lane) = (first / STRIP, first % STRIP);
+        self.keys[first..first + count].iter().map(move |row| row.0[lane] as u32)
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.keys.capacity() * size_of::<[u64; STRIP]>()
-            + self.strips.capacity() * size_of::<Strip>()
-            + TILE_SAMPLES * 8
+        self.keys.capacity() * size_of::<Row>() + self.strips.capacity() * size_of::<Strip>() + TILE_SAMPLES * 8
     }
 }
 
-/// Sorts every column of `rows`, greatest first.
+/// Sorts every column of `rows`, greatest first: blocks by networks, which are then merged.
 #[inline(always)]
-fn sort_rows<S: Simd>(simd: S, rows: &mut [[u64; STRIP]]) {
-    match rows.len() {
-        0 | 1 => {}
-        2 => sort_block::<S, 2>(simd, rows),
-        3..=4 => sort_block::<S, 4>(simd, rows),
-        5..=8 => sort_block::<S, 8>(simd, rows),
-        9..=BLOCK => sort_block::<S, BLOCK>(simd, rows),
-        _ => sort_many(simd, rows),
-    }
-}
-
-#[inline(always)]
-fn load<S: Simd>(simd: S, row: &[u64; STRIP]) -> f64x8<S> {
-    u64x8::load_array_ref(simd, row).bitcast()
-}
-
-#[inline(always)]
-fn store<S: Simd>(keys: f64x8<S>, row: &mut [u64; STRIP]) {
-    keys.bitcast::<u64x8<S>>().store_array(row);
-}
-
-/// Compares and exchanges pairs of rows.
-macro_rules! network {
-    ($rows:ident: $($near:literal $far:literal),*) => {
-        $(
-            let (a, b) = ($rows[$near], $rows[$far]);
-            ($rows[$near], $rows[$far]) = (a.max(b), a.min(b));
-        )*
-    };
-}
-
-/// Sorts up to `N` rows in registers by Batcher's odd-even merge sort (1968).
-#[inline(always)]
-fn sort_block<S: Simd, const N: usize>(simd: S, rows: &mut [[u64; STRIP]]) {
-    let mut sorted: [f64x8<S>; N] = std::array::from_fn(|i| match rows.get(i) {
-        Some(row) => load(simd, row),
-        None => f64x8::splat(simd, 0.0),
-    });
-    match N {
-        2 => {
-            network!(sorted: 0 1);
+fn sort_rows<S: Simd>(simd: S, rows: &mut [Row]) {
+    if rows.len() > BLOCK {
+        if is_sorted(simd, rows.iter()) {
+            return;
         }
-        4 => {
-            network!(sorted:
-            0 1, 2 3, 0 2, 1 3, 1 2
-            );
+        if is_sorted(simd, rows.iter().rev()) {
+            rows.reverse();
+            return;
         }
-        8 => {
-            network!(sorted:
-            0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6
-            );
-        }
-        _ => {
-            network!(sorted:
-            0 1, 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 0 2, 1 3, 4 6, 5 7, 8 10, 9 11, 12 14, 13 15, 1 2, 5
-            6, 9 10, 13 14, 0 4, 1 5, 2 6, 3 7, 8 12, 9 13, 10 14, 11 15, 2 4, 3 5, 10 12, 11 13, 1 2, 3 4, 5 6,
-            9 10, 11 12, 13 14, 0 8, 1 9, 2 10, 3 11, 4 12, 5 13, 6 14, 7 15, 4 8, 5 9, 6 10, 7 11, 2 4, 3 5, 6
-            8, 7 9, 10 12, 11 13, 1 2, 3 4, 5 6, 7 8, 9 10, 11 12, 13 14
-            );
-        }
-    }
-    for (row, keys) in rows.iter_mut().zip(sorted) {
-        store(keys, row);
-    }
-}
-
-/// Sorts blocks of rows and merges them.
-#[inline(always)]
-fn sort_many<S: Simd>(simd: S, rows: &mut [[u64; STRIP]]) {
-    if is_sorted(simd, rows.iter()) {
-        return;
-    }
-    if is_sorted(simd, rows.iter().rev()) {
-        rows.reverse();
-        return;
     }
     for block in rows.chunks_mut(BLOCK) {
-        sort_block::<S, BLOCK>(simd, block);
+        match block.len() {
+            0 | 1 => {}
+            2 => sort_2(simd, block),
+            3 | 4 => sort_4(simd, block),
+            _ => sort_8(simd, block),
+        }
     }
-    let count = rows.len();
     let mut sorted = BLOCK;
-    while sorted < count {
-        let mut step = sorted;
-        while step >= 1 {
-            let mut start = step % sorted;
-            while start + step < count {
-                for i in start..(start + step).min(count - step) {
-                    if i / (2 * sorted) == (i + step) / (2 * sorted) {
-                        let (a, b) = (load(simd, &rows[i]), load(simd, &rows[i + step]));
-                        store(a.max(b), &mut rows[i]);
-                        store(a.min(b), &mut rows[i + step]);
-                    }
-                }
-                start += 2 * step;
-            }
-            step /= 2;
+    while sorted < rows.len() {
+        for pair in rows.chunks_mut(2 * sorted).filter(|pair| pair.len() > sorted) {
+            merge(simd, pair, sorted);
         }
         sorted *= 2;
     }
 }
 
+#[inline(always)]
+fn load<S: Simd>(simd: S, row: &Row) -> f64x8<S> {
+    u64x8::load_array_ref(simd, &row.0).bitcast()
+}
+
+#[inline(always)]
+fn store<S: Simd>(keys: f64x8<S>, row: &mut Row) {
+    keys.bitcast::<u64x8<S>>().store_array(&mut row.0);
+}
+
+/// Sorts up to so many rows in registers by Batcher's odd-even merge sort (1968).
+macro_rules! network {
+    ($name:ident, $count:literal, $($near:literal $far:literal),*) => {
+        #[inline(always)]
+        fn $name<S: Simd>(simd: S, rows: &mut [Row]) {
+            let mut sorted = [f64x8::splat(simd, 0.0); $count];
+            for (keys, row) in sorted.iter_mut().zip(rows.iter()) {
+                *keys = load(simd, row);
+            }
+            $(
+                let (a, b) = (sorted[$near], sorted[$far]);
+                (sorted[$near], sorted[$far]) = (a.max(b), a.min(b));
+            )*
+            for (row, keys) in rows.iter_mut().zip(sorted) {
+                store(keys, row);
+            }
+        }
+    };
+}
+
+network!(sort_2, 2, 0 1);
+network!(sort_4, 4, 0 1, 2 3, 0 2, 1 3, 1 2);
+network!(
+    sort_8,
+    8,
+    0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6
+);
+
+/// Merges `sorted` sorted rows, a power of two, with the sorted rest: Batcher's odd-even merge, without the comparisons
+/// that reach beyond the last row, which could only move a 0.
+#[inline(always)]
+fn merge<S: Simd>(simd: S, rows: &mut [Row], sorted: usize) {
+    let (near, far) = rows.split_at_mut(sorted);
+    exchange(simd, near, far);
+    let mut step = sorted / 2;
+    while step >= 1 {
+        for pair in rows[step..].chunks_mut(2 * step).filter(|pair| pair.len() > step) {
+            let (near, far) = pair.split_at_mut(step);
+            exchange(simd, near, far);
+        }
+        step /= 2;
+    }
+}
+
+/// Compares and exchanges each of the rows in front with the one in the same place behind, if there is one.
+#[inline(always)]
+fn exchange<S: Simd>(simd: S, near: &mut [Row], far: &mut [Row]) {
+    for (near, far) in near.iter_mut().zip(far) {
+        let (a, b) = (load(simd, near), load(simd, far));
+        store(a.max(b), near);
+        store(a.min(b), far);
+    }
+}
+
 /// Whether all columns fall, as those of surfaces drawn in order do; or rise, seen from the other end.
 #[inline(always)]
-fn is_sorted<'r, S: Simd>(simd: S, mut rows: impl Iterator<Item = &'r [u64; STRIP]>) -> bool {
+fn is_sorted<'r, S: Simd>(simd: S, mut rows: impl Iterator<Item = &'r Row>) -> bool {
     let Some(first) = rows.next() else { return true };
     let mut last = load(simd, first);
     rows.all(|row| {

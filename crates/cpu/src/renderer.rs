@@ -1,6 +1,6 @@
 //! One frame, top to bottom.
 
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use fearless_simd::{Level, dispatch};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bin::{TILE_PX, TileGrid};
-use crate::setup::{Chunk, chunk_spans};
+use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
 use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
 use crate::transform::{Vertices, groups};
 
@@ -31,6 +31,7 @@ pub struct CpuRenderer {
 #[derive(Debug, Default)]
 struct Memory {
     vertices: Vertices,
+    scratches: Vec<SetupScratch>,
     chunks: Vec<Chunk>,
     workers: Vec<Worker>,
 }
@@ -109,8 +110,7 @@ impl CpuRenderer {
                 }
                 let left = capture.rect.left as usize;
                 let width = (capture.rect.right - capture.rect.left + 1) as usize;
-                let mut band =
-                    bands[(number / binned.grid.columns) as usize].lock().unwrap_or_else(PoisonError::into_inner);
+                let mut band = lock(&bands[(number / binned.grid.columns) as usize]);
                 for (to, from) in band.chunks_mut(view.width as usize).zip(buffers.pixels.chunks(TILE_PX as usize)) {
                     to[left..left + width].copy_from_slice(&from[..width]);
                 }
@@ -166,6 +166,8 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
     let viewport = Viewport::of(view);
     let grid = TileGrid::new(viewport);
     let mut chunks = std::mem::take(&mut memory.chunks);
+    let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
+    let chunk_triangles = chunk_triangles(scene.primitive_count() as usize, rayon::current_num_threads());
     let mut used = 0;
     let (mut transform_ms, mut setup_ms) = (0.0, 0.0);
     for group in groups(&draws) {
@@ -173,20 +175,23 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
         let group_draws = &draws[group.draws.clone()];
         memory.vertices.transform(group_draws, &viewport, level);
         let setup_start = Instant::now();
-        let spans = chunk_spans(group_draws, group.draws.start);
+        let spans = chunk_spans(group_draws, group.draws.start, chunk_triangles);
         if chunks.len() < used + spans.len() {
             chunks.resize_with(used + spans.len(), Chunk::default);
         }
         let vertices = &memory.vertices;
         chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
             let draw_vertices = |draw: usize| vertices.draw(draw - group.draws.start);
-            dispatch!(level, simd => chunk.fill(simd, spans, &draws, draw_vertices, &grid));
+            let mut scratch = lock(&scratches).pop().unwrap_or_default();
+            dispatch!(level, simd => chunk.fill(simd, spans, &draws, draw_vertices, &grid, &mut scratch));
+            lock(&scratches).push(scratch);
         });
         used += spans.len();
         transform_ms += (setup_start - transform_start).as_secs_f64() * 1e3;
         setup_ms += setup_start.elapsed().as_secs_f64() * 1e3;
     }
     chunks.truncate(used);
+    memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);
     let threads = rayon::current_num_threads();
     let device = format!("CPU, {threads} thread{}", if threads == 1 { "" } else { "s" });
     let mut stats = Stats::new(Technique::Cpu, device, view.width, view.height);
@@ -213,23 +218,27 @@ fn for_each_tile(
     let mut tiles: Vec<u32> = (0..binned.grid.tile_count() as u32).collect();
     tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(costs[tile as usize]));
     let spare = Mutex::new(std::mem::take(&mut memory.workers));
-    let lock = || spare.lock().unwrap_or_else(PoisonError::into_inner);
     let next = std::sync::atomic::AtomicUsize::new(0);
     let results = Mutex::new((FragmentCounts::default(), 0));
     rayon::broadcast(|_| {
-        let mut worker = lock().pop().unwrap_or_default();
+        let mut worker = lock(&spare).pop().unwrap_or_default();
         let mut counts = FragmentCounts::default();
         while let Some(&tile) = tiles.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed)) {
             counts = counts.merged(worker.capture.capture(tile, binned.parts()));
             resolve(tile, &worker.capture, &mut worker.buffers);
         }
-        let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut results = lock(&results);
         results.0 = results.0.merged(counts);
         results.1 += worker.capture.bytes() + worker.buffers.layers.fragments.capacity() * size_of::<Fragment>();
-        lock().push(worker);
+        lock(&spare).push(worker);
     });
     memory.workers = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
     results.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a mutex guards. A panic elsewhere ends the frame anyway.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A picture of the background, made by all threads.
@@ -262,7 +271,8 @@ impl Binned<'_> {
         stats.max_depth_complexity = counts.greatest;
         stats.mean_depth_complexity = counts.fragments as f64 / counts.covered_pixels.max(1) as f64;
         let chunk_bytes: usize = self.chunks.iter().map(Chunk::bytes).sum();
-        stats.peak_bytes = (chunk_bytes + memory.vertices.bytes() + capture_bytes) as u64;
+        let scratch_bytes: usize = memory.scratches.iter().map(SetupScratch::bytes).sum();
+        stats.peak_bytes = (chunk_bytes + scratch_bytes + memory.vertices.bytes() + capture_bytes) as u64;
         memory.chunks = std::mem::take(&mut self.chunks);
         stats
     }

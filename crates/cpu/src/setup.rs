@@ -8,7 +8,7 @@ use pellucid_core::shading::CornerNormals;
 
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
-use crate::small::{LANES, SmallFragments, SmallTriangles};
+use crate::small::{LANES, MOST_FRAGMENTS, NewFragments, SmallFragments, SmallTriangles};
 use crate::transform::{DrawVertices, outcode};
 
 /// A triangle in sight, or a piece of a clipped one.
@@ -26,12 +26,12 @@ pub(crate) struct Record {
     pub(crate) fold: Fold,
 }
 
-/// [`Corners`] in 4 bytes: the weights of clipped ones stand in a table.
+/// [`Corners`] in 8 bytes: the weights of clipped ones stand in a table.
 #[derive(Debug, Clone, Copy)]
 enum RecordCorners {
     Whole,
     Swapped,
-    Clipped(u16),
+    Clipped(u32),
 }
 
 /// Triangles set up by one thread in one go, in draw order.
@@ -52,16 +52,6 @@ pub(crate) struct PassBins {
 }
 
 impl PassBins {
-    fn begin(&mut self) {
-        self.records.begin();
-        self.small.begin();
-    }
-
-    fn finish(&mut self, grid: &TileGrid) {
-        self.records.finish(grid);
-        self.small.finish(grid);
-    }
-
     /// Adds how much each tile has to do.
     pub(crate) fn add_counts(&self, counts: &mut [u32]) {
         self.records.add_counts(counts);
@@ -70,6 +60,20 @@ impl PassBins {
 
     fn bytes(&self) -> usize {
         self.records.bytes() + self.small.bytes()
+    }
+}
+
+/// What a thread needs to fill one chunk after another.
+#[derive(Debug, Default)]
+pub(crate) struct SetupScratch {
+    opaque: NewFragments,
+    transparent: NewFragments,
+}
+
+impl SetupScratch {
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.opaque.bytes() + self.transparent.bytes()
     }
 }
 
@@ -84,14 +88,14 @@ pub(crate) struct Span {
     pub(crate) count: usize,
 }
 
-/// Most triangles in a chunk. Each may leave [`MAX_PIECES`] pieces, which must be numbered in 16 bits.
-pub(crate) const CHUNK_TRIANGLES: usize = 8192;
+/// Triangles in a chunk: enough for each thread to get many, so that all end at about the same time, but not so many that
+/// what is between set-up and tiles leaves the second-level cache, nor so few that tiles find little in each.
+pub(crate) fn chunk_triangles(total: usize, threads: usize) -> usize {
+    (total / (threads * 16)).clamp(1024, 16_384)
+}
 
-const MAX_PIECES: usize = pellucid_core::clip::MAX_CLIPPED_VERTICES - 2;
-const _: () = assert!(CHUNK_TRIANGLES * MAX_PIECES <= u16::MAX as usize);
-
-/// Cuts the triangles of a group's draws into chunks.
-pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span>> {
+/// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.
+pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize, chunk_triangles: usize) -> Vec<Vec<Span>> {
     let mut chunks: Vec<Vec<Span>> = Vec::new();
     let mut room = 0;
     for (i, draw) in draws.iter().enumerate() {
@@ -100,7 +104,7 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span
         while first < total {
             if room == 0 {
                 chunks.push(Vec::new());
-                room = CHUNK_TRIANGLES;
+                room = chunk_triangles;
             }
             let count = (total - first).min(room);
             if let Some(chunk) = chunks.last_mut() {
@@ -123,17 +127,25 @@ impl Chunk {
         draws: &[Draw<'_>],
         draw_vertices: impl Fn(usize) -> DrawVertices<'v>,
         grid: &TileGrid,
+        scratch: &mut SetupScratch,
     ) {
         self.records.clear();
         self.clipped.clear();
         self.dropped_triangles = 0;
-        self.opaque.begin();
-        self.transparent.begin();
+        self.opaque.records.begin();
+        self.transparent.records.begin();
         for span in spans {
-            self.set_up(simd, span, &draws[span.draw], draw_vertices(span.draw), grid);
+            let draw = &draws[span.draw];
+            let new = match draw.pass {
+                Pass::Opaque => &mut scratch.opaque,
+                Pass::Transparent => &mut scratch.transparent,
+            };
+            self.set_up(simd, span, draw, draw_vertices(span.draw), grid, new);
         }
-        self.opaque.finish(grid);
-        self.transparent.finish(grid);
+        self.opaque.records.finish(grid);
+        self.transparent.records.finish(grid);
+        self.opaque.small.take(&mut scratch.opaque, grid);
+        self.transparent.small.take(&mut scratch.transparent, grid);
     }
 
     #[inline(always)]
@@ -144,6 +156,7 @@ impl Chunk {
         draw: &Draw<'_>,
         vertices: DrawVertices<'_>,
         grid: &TileGrid,
+        new: &mut NewFragments,
     ) {
         let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
         let mut small = SmallTriangles::default();
@@ -167,15 +180,22 @@ impl Chunk {
                 while lanes != 0 {
                     let lane = lanes.trailing_zeros() as usize;
                     lanes &= lanes - 1;
-                    let covered = sight.covered(lane);
-                    if covered == 0 {
+                    let blocks = sight.blocks(lane);
+                    if !sight.has_one_block()
+                        && blocks.iter().map(|(_, covered)| covered.count_ones()).sum::<u32>() > MOST_FRAGMENTS
+                    {
+                        records |= 1 << lane;
                         continue;
                     }
                     let [a, b, c] = triangles[lane];
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
-                    if small.push(first + lane, corners, [sight.left[lane], sight.top[lane]], covered) {
-                        let bins = self.bins(draw.pass);
-                        small.flush(simd, draw, span.draw as u32, vertices, grid, &mut bins.small);
+                    for (block, covered) in blocks {
+                        if covered != 0 && small.push(first + lane, corners, block, covered) {
+                            small.flush(simd, draw, span.draw as u32, vertices, grid, new);
+                        }
+                        if sight.has_one_block() {
+                            break;
+                        }
                     }
                 }
             }
@@ -185,8 +205,7 @@ impl Chunk {
                 self.set_up_record(span.draw, draw, first + lane, triangles[lane], vertices, grid);
             }
         }
-        let bins = self.bins(draw.pass);
-        small.flush(simd, draw, span.draw as u32, vertices, grid, &mut bins.small);
+        small.flush(simd, draw, span.draw as u32, vertices, grid, new);
     }
 
     #[inline(always)]
@@ -233,20 +252,14 @@ impl Chunk {
     }
 
     #[cold]
-    fn set_up_clipped(
-        &mut self,
-        draw_number: usize,
-        draw: &Draw<'_>,
-        triangle: usize,
-        grid: &TileGrid,
-    ) {
+    fn set_up_clipped(&mut self, draw_number: usize, draw: &Draw<'_>, triangle: usize, grid: &TileGrid) {
         for piece in draw.pieces(triangle, &grid.viewport).unwrap_or_default() {
             let kind = match piece.corners {
                 Corners::Whole { swapped: false } => RecordCorners::Whole,
                 Corners::Whole { swapped: true } => RecordCorners::Swapped,
                 Corners::Clipped(weights) => {
                     self.clipped.push(weights);
-                    RecordCorners::Clipped((self.clipped.len() - 1) as u16)
+                    RecordCorners::Clipped((self.clipped.len() - 1) as u32)
                 }
             };
             self.push(draw_number, draw, triangle, piece.triangle.vertices, kind, piece.fold, grid);

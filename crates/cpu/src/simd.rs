@@ -42,6 +42,12 @@ impl<S: Simd> Wide<S> {
         Self(low, high)
     }
 
+    #[inline(always)]
+    pub(crate) fn from_int(values: i32x16<S>) -> Self {
+        let (low, high) = values.widen();
+        Self(low.to_float(), high.to_float())
+    }
+
     /// From integers below 2^24, which f32 holds exactly.
     #[inline(always)]
     pub(crate) fn from_small_int(values: i32x16<S>) -> Self {

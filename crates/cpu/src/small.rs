@@ -1,11 +1,11 @@
 //! Small triangles to fragments, sixteen triangles at a time.
 //!
-//! A triangle less than 8 pixels wide and high is not worth a place in the bins: most have one or two fragments. These
-//! are made and lit right after set-up, the first fragment of all sixteen triangles in one go, then the second, and so
-//! on. All that is left for the tile is to order and blend them.
+//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up: the
+//! first of all sixteen triangles in one go, then the second, and so on. All that is left for the tile is to order and
+//! blend them. A triangle that reaches several blocks of samples takes part once for each.
 
 use fearless_simd::{Simd, SimdBase, SimdInt, f32x16, i32x16};
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
@@ -15,8 +15,12 @@ use crate::transform::DrawVertices;
 
 pub(crate) const LANES: usize = 16;
 
-/// Side of the block of samples that a small triangle reaches at most, its first sample at the top left.
-pub(crate) const SMALL_PX: i32 = 8;
+/// Side of a block of samples.
+pub(crate) const BLOCK_PX: i32 = 8;
+
+/// Most fragments of a small triangle. One that has more is a record: it takes less room, and a tile makes fragments side
+/// by side as fast.
+pub(crate) const MOST_FRAGMENTS: u32 = 32;
 
 /// Bits of a sample's number in its tile.
 const SAMPLE_BITS: u32 = 10;
@@ -33,19 +37,25 @@ pub(crate) struct SmallFragment {
     pub(crate) draw: u32,
 }
 
+/// Fragments of small triangles as they come, in draw order. A thread's, used again for every chunk.
+#[derive(Debug, Default)]
+pub(crate) struct NewFragments {
+    /// Tile and sample of each.
+    places: Vec<u32>,
+    fragments: Vec<SmallFragment>,
+    /// How many have come; beyond is room.
+    count: usize,
+}
+
 /// Fragments of small triangles by tile, in draw order.
 #[derive(Debug, Default)]
 pub(crate) struct SmallFragments {
-    /// Tile and sample of each, as they come, and how many have come; beyond that is room.
-    places: Vec<u32>,
-    unsorted: Vec<SmallFragment>,
-    count: usize,
     starts: Vec<u32>,
     samples: Vec<u16>,
     fragments: Vec<SmallFragment>,
 }
 
-/// Small triangles that wait to be sixteen.
+/// Small triangles, or blocks of them, that wait to be sixteen.
 #[derive(Debug, Default)]
 pub(crate) struct SmallTriangles {
     count: usize,
@@ -63,13 +73,7 @@ pub(crate) struct SmallTriangles {
 impl SmallTriangles {
     /// Adds a triangle; returns whether there are sixteen.
     #[inline(always)]
-    pub(crate) fn push(
-        &mut self,
-        triangle: usize,
-        corners: [u32; 3],
-        [left, top]: [i32; 2],
-        covered: u64,
-    ) -> bool {
+    pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {
         let lane = self.count;
         self.corners[lane] = corners;
         self.triangles[lane] = triangle as u32;
@@ -89,77 +93,53 @@ impl SmallTriangles {
         draw_number: u32,
         vertices: DrawVertices<'_>,
         grid: &TileGrid,
-        fragments: &mut SmallFragments,
+        fragments: &mut NewFragments,
     ) {
         let triangle_count = std::mem::take(&mut self.count);
         if triangle_count == 0 {
             return;
         }
-        // The planes of depth and of weights, as `ScreenTriangle` has them.
-        let corner = |k: usize| -> (i32x16<S>, i32x16<S>) {
-            let mut pairs = [[0; 2]; LANES];
-            for (pair, corners) in pairs.iter_mut().zip(&self.corners[..triangle_count]) {
-                *pair = vertices.positions[corners[k] as usize];
-            }
-            load_pairs(simd, &pairs)
-        };
-        let ((ax, ay), (bx, by), (cx, cy)) = (corner(0), corner(1), corner(2));
-        let anchor = |a: i32x16<S>| a >> 8;
-        let (anchor_x, anchor_y) = (anchor(ax), anchor(ay));
-        let middle = |px: i32x16<S>| (px << 8) + center(0);
-        let (x, y) = (middle(anchor_x), middle(anchor_y));
-        let edge = |from_x: i32x16<S>, from_y: i32x16<S>, to_x: i32x16<S>, to_y: i32x16<S>| {
-            let (a, b) = (from_y - to_y, to_x - from_x);
-            (a, b, a * (x - from_x) + b * (y - from_y))
-        };
-        let area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
+        // The planes of weights and of depth, as `ScreenTriangle` has them.
+        let corners = &self.corners[..triangle_count];
+        let a: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 0, vertices.positions);
+        let b: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 1, vertices.positions);
+        let c: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 2, vertices.positions);
+        let (anchor_x, anchor_y) = (a.0 >> 8, a.1 >> 8);
+        let anchor = ((anchor_x << 8) + center(0), (anchor_y << 8) + center(0));
+        let area = (b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1);
         let inv_area = Wide::splat(simd, 1.0) / Wide::from_small_int(area);
-        let step = Wide::splat(simd, f64::from(SUBPIXELS)) * inv_area;
-        let plane = |(a, b, value): (i32x16<S>, i32x16<S>, i32x16<S>)| {
-            [(value, inv_area), (a, step), (b, step)].map(|(int, factor)| Wide::from_small_int(int) * factor)
+        let second = WidePlane::weight(simd, c, a, anchor, inv_area);
+        let third = WidePlane::weight(simd, a, b, anchor, inv_area);
+        let (a_z, a_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 0, vertices.depths);
+        let (b_z, b_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 1, vertices.depths);
+        let (c_z, c_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 2, vertices.depths);
+        let (least, greatest) = (a_z.min(b_z).min(c_z), a_z.max(b_z).max(c_z));
+        let first_z = Wide::from_f32(a_z);
+        let (to_second, to_third) = (Wide::from_f32(b_z) - first_z, Wide::from_f32(c_z) - first_z);
+        let depth_plane = WidePlane {
+            value: first_z + (second.value * to_second + third.value * to_third),
+            dx: second.dx * to_second + third.dx * to_third,
+            dy: second.dy * to_second + third.dy * to_third,
         };
-        let (second, third) = (plane(edge(cx, cy, ax, ay)), plane(edge(ax, ay, bx, by)));
-        let depth_w = |k: usize| -> (f32x16<S>, f32x16<S>) {
-            let mut pairs = [[0.0; 2]; LANES];
-            for (pair, corners) in pairs.iter_mut().zip(&self.corners[..triangle_count]) {
-                *pair = vertices.depths[corners[k] as usize];
-            }
-            load_pairs(simd, &pairs)
-        };
-        let ((az, a_inv_w), (bz, b_inv_w), (cz, c_inv_w)) = (depth_w(0), depth_w(1), depth_w(2));
-        let (least, greatest) = (az.min(bz).min(cz), az.max(bz).max(cz));
-        let [z0, z1, z2] = [az, bz, cz].map(Wide::from_f32);
-        let (dz1, dz2) = (z1 - z0, z2 - z0);
-        let depth_value = z0 + (second[0] * dz1 + third[0] * dz2);
-        let depth_dx = second[1] * dz1 + third[1] * dz2;
-        let depth_dy = second[2] * dz1 + third[2] * dz2;
 
-        let lighting = if !draw.lit {
-            Lighting::Constant(f32x16::splat(simd, 1.0))
-        } else if let Some(normals) = draw.mesh.normals() {
-            let corner = |k: usize, inv_w: f32x16<S>| {
-                let normal = gather(simd, &self.corners[..triangle_count], |corners| normals[corners[k] as usize]);
-                in_view(draw, normal).map(|n| n * inv_w)
-            };
-            let (a, b, c) = (corner(0, a_inv_w), corner(1, b_inv_w), corner(2, c_inv_w));
-            let [[second_value, second_dx, second_dy], [third_value, third_dx, third_dy]] =
-                [second, third].map(|plane| plane.map(Wide::to_f32));
-            Lighting::Smooth([0, 1, 2].map(|i| {
-                let (to_b, to_c) = (b[i] - a[i], c[i] - a[i]);
-                [
-                    a[i] + (to_b * second_value + to_c * third_value),
-                    to_b * second_dx + to_c * third_dx,
-                    to_b * second_dy + to_c * third_dy,
-                ]
-            }))
-        } else {
-            let normal = gather(simd, &self.triangles[..triangle_count], |&triangle| {
-                let [a, b, c] = draw.mesh.triangles()[triangle as usize].map(|v| draw.mesh.positions()[v as usize]);
-                let unit = |edge: Vec3| edge / edge.abs().max_element().max(f32::MIN_POSITIVE);
-                unit(b - a).cross(unit(c - a))
-            });
-            Lighting::Constant(light(simd, in_view(draw, normal)))
-        };
+        let mut steady_light = f32x16::splat(simd, 1.0);
+        let mut normal_planes = None;
+        if draw.lit
+            && let Some(normals) = draw.mesh.normals()
+        {
+            let a = in_view(draw, gather(simd, corners, |corners| normals[corners[0] as usize]));
+            let b = in_view(draw, gather(simd, corners, |corners| normals[corners[1] as usize]));
+            let c = in_view(draw, gather(simd, corners, |corners| normals[corners[2] as usize]));
+            let weights = [second.to_f32(), third.to_f32()];
+            normal_planes = Some([
+                normal_plane(a[0] * a_inv_w, b[0] * b_inv_w, c[0] * c_inv_w, &weights),
+                normal_plane(a[1] * a_inv_w, b[1] * b_inv_w, c[1] * c_inv_w, &weights),
+                normal_plane(a[2] * a_inv_w, b[2] * b_inv_w, c[2] * c_inv_w, &weights),
+            ]);
+        } else if draw.lit {
+            let normal = gather(simd, &self.triangles[..triangle_count], |&triangle| flat_normal(draw, triangle));
+            steady_light = light(simd, in_view(draw, normal));
+        }
 
         // Fragments are made in turns but put down in draw order.
         let mut next = [0; LANES];
@@ -185,16 +165,16 @@ impl SmallTriangles {
                 *bit = covered.trailing_zeros() as i32;
             }
             let bits = i32x16::load_array(simd, bits);
-            let (x, y) = (left + (bits & (SMALL_PX - 1)), top + (bits >> 3));
+            let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
             let tile = (y >> 5) * grid.columns as i32 + (x >> 5);
             let places = (tile << SAMPLE_BITS) | ((y & rows as i32) << 5) | (x & columns as i32);
             let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
-            let depth = (depth_value + Wide::from_f32(y) * depth_dy) + Wide::from_f32(x) * depth_dx;
+            let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
             // Adding zero turns -0 into 0.
             let depth = depth.to_f32().max(least).min(greatest) + 0.0;
-            let light = match &lighting {
-                Lighting::Constant(light) => *light,
-                Lighting::Smooth(planes) => light(simd, planes.map(|[value, dx, dy]| (value + dy * y) + dx * x)),
+            let light = match &normal_planes {
+                None => steady_light,
+                Some([nx, ny, nz]) => light(simd, [at(nx, x, y), at(ny, x, y), at(nz, x, y)]),
             };
             let (places, depth, light): ([i32; LANES], [f32; LANES], [f32; LANES]) =
                 (places.into(), depth.into(), light.into());
@@ -206,7 +186,7 @@ impl SmallTriangles {
                 let place = next[lane];
                 next[lane] += 1;
                 fragments.places[place] = places[lane] as u32;
-                fragments.unsorted[place] = SmallFragment {
+                fragments.fragments[place] = SmallFragment {
                     depth: depth[lane],
                     light: light[lane],
                     primitive: primitives[lane],
@@ -218,12 +198,65 @@ impl SmallTriangles {
     }
 }
 
-/// How sixteen triangles are lit.
-enum Lighting<S: Simd> {
-    /// Flat, or not at all: one brightness each.
-    Constant(f32x16<S>),
-    /// By the normal's x, y and z: value at the anchor, change to the right, change downwards.
-    Smooth([[f32x16<S>; 3]; 3]),
+/// A plane for each of sixteen triangles.
+struct WidePlane<S: Simd> {
+    value: Wide<S>,
+    dx: Wide<S>,
+    dy: Wide<S>,
+}
+
+impl<S: Simd> WidePlane<S> {
+    /// Of the weight that an edge's opposite corner has.
+    #[inline(always)]
+    fn weight(
+        simd: S,
+        (from_x, from_y): (i32x16<S>, i32x16<S>),
+        (to_x, to_y): (i32x16<S>, i32x16<S>),
+        (x, y): (i32x16<S>, i32x16<S>),
+        inv_area: Wide<S>,
+    ) -> Self {
+        let (a, b) = (from_y - to_y, to_x - from_x);
+        let step = Wide::splat(simd, f64::from(SUBPIXELS)) * inv_area;
+        Self {
+            value: Wide::from_int(a * (x - from_x) + b * (y - from_y)) * inv_area,
+            dx: Wide::from_small_int(a) * step,
+            dy: Wide::from_small_int(b) * step,
+        }
+    }
+
+    #[inline(always)]
+    fn to_f32(&self) -> [f32x16<S>; 3] {
+        [self.value.to_f32(), self.dx.to_f32(), self.dy.to_f32()]
+    }
+}
+
+/// One axis of a plane of normals: value at the anchor, change to the right, change downwards.
+#[inline(always)]
+fn normal_plane<S: Simd>(
+    a: f32x16<S>,
+    b: f32x16<S>,
+    c: f32x16<S>,
+    [second, third]: &[[f32x16<S>; 3]; 2],
+) -> [f32x16<S>; 3] {
+    let (to_b, to_c) = (b - a, c - a);
+    [a + (to_b * second[0] + to_c * third[0]), to_b * second[1] + to_c * third[1], to_b * second[2] + to_c * third[2]]
+}
+
+#[inline(always)]
+fn at<S: Simd>([value, dx, dy]: &[f32x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+    (*value + *dy * y) + *dx * x
+}
+
+/// The geometric normal of a triangle.
+#[inline(always)]
+fn flat_normal(draw: &Draw<'_>, triangle: u32) -> Vec3 {
+    let [a, b, c] = draw.mesh.triangles()[triangle as usize].map(|vertex| draw.mesh.positions()[vertex as usize]);
+    unit(b - a).cross(unit(c - a))
+}
+
+#[inline(always)]
+fn unit(edge: Vec3) -> Vec3 {
+    edge / edge.abs().max_element().max(f32::MIN_POSITIVE)
 }
 
 /// A vector for each of sixteen lanes, as structure of arrays.
@@ -233,49 +266,62 @@ fn gather<S: Simd, T>(simd: S, lanes: &[T], vector: impl Fn(&T) -> Vec3) -> [f32
     for (lane, from) in lanes.iter().enumerate() {
         [x[lane], y[lane], z[lane]] = vector(from).to_array();
     }
-    [x, y, z].map(|axis| f32x16::load_array(simd, axis))
+    [f32x16::load_array(simd, x), f32x16::load_array(simd, y), f32x16::load_array(simd, z)]
+}
+
+/// Pairs of numbers at one corner of each triangle.
+#[inline(always)]
+fn gather_pairs<S: Simd, V: SimdBase<S>>(simd: S, corners: &[[u32; 3]], k: usize, from: &[[V::Element; 2]]) -> (V, V) {
+    let mut pairs = [[V::Element::default(); 2]; LANES];
+    for (pair, corners) in pairs.iter_mut().zip(corners) {
+        *pair = from[corners[k] as usize];
+    }
+    load_pairs(simd, &pairs)
 }
 
 /// Normals in camera space.
 #[inline(always)]
 fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     let matrix = &draw.view_from_normal;
-    let [x_axis, y_axis, z_axis] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis: Vec3A| axis.to_array());
-    [0, 1, 2].map(|i| (x * x_axis[i] + y * y_axis[i]) + z * z_axis[i])
+    [
+        (x * matrix.x_axis.x + y * matrix.y_axis.x) + z * matrix.z_axis.x,
+        (x * matrix.x_axis.y + y * matrix.y_axis.y) + z * matrix.z_axis.y,
+        (x * matrix.x_axis.z + y * matrix.y_axis.z) + z * matrix.z_axis.z,
+    ]
 }
 
 /// Two arrays from one of pairs.
 #[inline(always)]
-pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element; 2]; LANES]) -> (V, V)
-where
-    V::Element: Copy,
-{
+pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element; 2]; LANES]) -> (V, V) {
     let (low, high) = pairs.as_flattened().split_at(LANES);
     V::from_slice(simd, low).deinterleave(V::from_slice(simd, high))
 }
 
-impl SmallFragments {
-    /// Forgets all.
-    pub(crate) fn begin(&mut self) {
-        self.count = 0;
-    }
-
+impl NewFragments {
     #[inline(always)]
     fn make_room(&mut self, count: usize) {
         if self.places.len() < count {
             let room = count.next_power_of_two().max(1024);
             self.places.resize(room, 0);
-            self.unsorted.resize(room, SmallFragment::default());
+            self.fragments.resize(room, SmallFragment::default());
         }
     }
 
-    /// Sorts what came by tile, keeping draw order.
-    pub(crate) fn finish(&mut self, grid: &TileGrid) {
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.places.capacity() * 4 + self.fragments.capacity() * size_of::<SmallFragment>()
+    }
+}
+
+impl SmallFragments {
+    /// Takes over what came, sorted by tile, keeping draw order.
+    pub(crate) fn take(&mut self, new: &mut NewFragments, grid: &TileGrid) {
         self.starts.clear();
-        if self.count == 0 {
+        let count = std::mem::take(&mut new.count);
+        if count == 0 {
             return;
         }
-        let (places, unsorted) = (&self.places[..self.count], &self.unsorted[..self.count]);
+        let (places, fragments) = (&new.places[..count], &new.fragments[..count]);
         self.starts.resize(grid.tile_count() + 1, 0);
         for place in places {
             self.starts[(place >> SAMPLE_BITS) as usize + 1] += 1;
@@ -283,12 +329,13 @@ impl SmallFragments {
         for i in 1..self.starts.len() {
             self.starts[i] += self.starts[i - 1];
         }
-        if self.samples.len() < self.count {
-            self.samples.resize(self.places.len(), 0);
-            self.fragments.resize(self.places.len(), SmallFragment::default());
+        if self.samples.len() < count {
+            // A little more, so that another frame does not need a little more.
+            self.samples.resize(count + count / 16, 0);
+            self.fragments.resize(count + count / 16, SmallFragment::default());
         }
         // Each start moves to the next one's place while its fragments are put down ...
-        for (&place, &fragment) in places.iter().zip(unsorted) {
+        for (&place, &fragment) in places.iter().zip(fragments) {
             let start = &mut self.starts[(place >> SAMPLE_BITS) as usize];
             self.samples[*start as usize] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
             self.fragments[*start as usize] = fragment;
@@ -317,8 +364,8 @@ impl SmallFragments {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        (self.places.capacity() + self.starts.capacity()) * 4
-            + (self.unsorted.capacity() + self.fragments.capacity()) * size_of::<SmallFragment>()
+        self.starts.capacity() * 4
+            + self.fragments.capacity() * size_of::<SmallFragment>()
             + self.samples.capacity() * 2
     }
 }

@@ -92,11 +92,12 @@ pub(crate) struct FrameParts<'a> {
 impl TileCapture {
     /// Captures a tile and orders its fragments.
     pub(crate) fn capture(&mut self, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
-        dispatch!(frame.level, simd => self.capture_simd(simd, number, frame))
+        dispatch!(frame.level, simd => self.capture_simd(simd, number, frame));
+        self.order.sort(frame.level, &self.fragments)
     }
 
     #[inline(always)]
-    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
+    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, frame: FrameParts<'_>) {
         self.rect = frame.grid.tile(number);
         self.surfaces.clear();
         self.fragments.clear();
@@ -139,7 +140,6 @@ impl TileCapture {
             }
             self.add_small(small, samples);
         }
-        self.order.sort(simd, &self.fragments)
     }
 
     #[inline(always)]
@@ -316,10 +316,12 @@ impl TileCapture {
                 Some(Fragment { color, depth: fragment.depth, primitive: fragment.primitive })
             }));
             layers.ends.push(layers.fragments.len() as u32);
-            layers.opaque.push(self.opaque_color(sample, x, y, frame).map(|color| OpaqueSurface {
-                color,
-                depth: f32::from_bits((self.opaque_keys[sample] >> 32) as u32),
-            }));
+            layers.opaque.push(
+                self.opaque_color(sample, x, y, frame).map(|color| OpaqueSurface {
+                    color,
+                    depth: f32::from_bits((self.opaque_keys[sample] >> 32) as u32),
+                }),
+            );
         }
     }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdMask, dispatch, f32x16, i32x16};
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use pellucid_core::pixel_grid::{GUARD_BAND_PX, SUBPIXELS, ScreenVertex, Viewport};
 use pellucid_core::primitive::{Draw, transform_point};
 use rayon::prelude::*;
@@ -173,12 +173,18 @@ fn transform_lanes<S: Simd>(
     positions: &mut [[i32; 2]; LANES],
     depths: &mut [[f32; 2]; LANES],
 ) -> bool {
-    let axis = |axis: fn(&Vec3) -> f32| f32x16::load_array(simd, points.each_ref().map(axis));
-    let (x, y, z) = (axis(|point| point.x), axis(|point| point.y), axis(|point| point.z));
+    let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for (lane, point) in points.iter().enumerate() {
+        [x[lane], y[lane], z[lane]] = point.to_array();
+    }
+    let point = [f32x16::load_array(simd, x), f32x16::load_array(simd, y), f32x16::load_array(simd, z)];
     let matrix = &draw.clip_from_mesh;
-    let row =
-        |row: usize| ((x * matrix.x_axis[row] + y * matrix.y_axis[row]) + z * matrix.z_axis[row]) + matrix.w_axis[row];
-    let (clip_x, clip_y, clip_z, clip_w) = (row(0), row(1), row(2), row(3));
+    let (clip_x, clip_y, clip_z, clip_w) = (
+        matrix_row(matrix, 0, point),
+        matrix_row(matrix, 1, point),
+        matrix_row(matrix, 2, point),
+        matrix_row(matrix, 3, point),
+    );
     let [guard_x, guard_y] = viewport.guard();
     let (limit_x, limit_y) = (clip_w * guard_x, clip_w * guard_y);
     let outside = clip_z.simd_gt(clip_w)
@@ -192,18 +198,25 @@ fn transform_lanes<S: Simd>(
         return false;
     }
     let inv_w = f32x16::splat(simd, 1.0) / clip_w;
-    let guard = (GUARD_BAND_PX * SUBPIXELS) as f32;
     let [half_x, half_y] = viewport.half();
-    let snap = |clip: f32x16<S>, half: i32| -> i32x16<S> {
-        let ndc = clip * inv_w;
-        (ndc * half as f32).max_precise(-guard).min_precise(guard).round_ties_even().to_int()
-    };
-    let screen_x = snap(clip_x, half_x) + half_x;
-    let screen_y = i32x16::splat(simd, half_y) - snap(clip_y, half_y);
+    let screen_x = snap(clip_x * inv_w, half_x) + half_x;
+    let screen_y = i32x16::splat(simd, half_y) - snap(clip_y * inv_w, half_y);
     let depth = ((clip_z * inv_w).max_precise(0.0) + 0.0).min_precise(1.0);
     store_pairs(screen_x, screen_y, positions.as_flattened_mut());
     store_pairs(depth, inv_w, depths.as_flattened_mut());
     true
+}
+
+#[inline(always)]
+fn matrix_row<S: Simd>(matrix: &Mat4, row: usize, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
+    ((x * matrix.x_axis[row] + y * matrix.y_axis[row]) + z * matrix.z_axis[row]) + matrix.w_axis[row]
+}
+
+/// From -1..=1 to subpixels.
+#[inline(always)]
+fn snap<S: Simd>(ndc: f32x16<S>, half: i32) -> i32x16<S> {
+    let guard = (GUARD_BAND_PX * SUBPIXELS) as f32;
+    (ndc * half as f32).max_precise(-guard).min_precise(guard).round_ties_even().to_int()
 }
 
 #[inline(always)]
