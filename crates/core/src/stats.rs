@@ -46,6 +46,8 @@ pub struct Stats {
     pub cut_pixels: u64,
     /// Windows of slots that an F-Buffer slid over, in all parts of the screen; 0 for other techniques.
     pub slot_windows: u64,
+    /// Pixels that a depth filter left out of order, and that were rendered again; 0 for techniques without.
+    pub repaired_pixels: u64,
 }
 
 impl Stats {
@@ -68,6 +70,7 @@ impl Stats {
             rerenders: 0,
             cut_pixels: 0,
             slot_windows: 0,
+            repaired_pixels: 0,
         }
     }
 

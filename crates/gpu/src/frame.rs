@@ -9,6 +9,7 @@ use crate::memory::{Memory, Window};
 use crate::pass::picture::PictureGroup;
 use crate::steps::Steps;
 use crate::surface::Surfaces;
+use crate::technique::DepthFilter;
 use crate::{Context, GpuError};
 
 /// Textures of the picture's size, kept between frames.
@@ -93,7 +94,11 @@ pub(crate) struct Frame<'a> {
     pub(crate) fbuffer_size: Option<Size>,
     /// Windows of slots so far.
     pub(crate) slot_windows: u64,
-    frame_data: wgpu::Buffer,
+    /// How the rasterizer in compute blends.
+    pub(crate) depth_filter: DepthFilter,
+    /// Pixels that its depth filter left out of order, and that were rendered again.
+    pub(crate) repaired_pixels: u64,
+    pub(crate) frame_data: wgpu::Buffer,
     encoder: Option<wgpu::CommandEncoder>,
 }
 
@@ -132,6 +137,8 @@ impl<'a> Frame<'a> {
             cut_pixels: 0,
             fbuffer_size: None,
             slot_windows: 0,
+            depth_filter: DepthFilter::default(),
+            repaired_pixels: 0,
             frame_data,
             encoder: None,
         }
