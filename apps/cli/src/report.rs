@@ -39,6 +39,7 @@ pub(crate) struct Figures {
     windows: u32,
     rerenders: u32,
     cut_pixels: u64,
+    repaired_pixels: u64,
 }
 
 /// A timed part of a frame.
@@ -110,6 +111,7 @@ impl From<&Stats> for Figures {
             windows: stats.windows,
             rerenders: stats.rerenders,
             cut_pixels: stats.cut_pixels,
+            repaired_pixels: stats.repaired_pixels,
         }
     }
 }

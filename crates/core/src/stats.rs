@@ -42,7 +42,8 @@ pub struct Stats {
     pub windows: u32,
     /// Captures repeated because an estimate of their size was too small.
     pub rerenders: u32,
-    /// Pixels with more layers than the frame was allowed to peel: the picture is not exact there.
+    /// Pixels with more layers than the frame was allowed to peel, or left early as too little light gets through: the picture
+    /// is not exact there.
     pub cut_pixels: u64,
     /// Windows of slots that an F-Buffer slid over, in all parts of the screen; 0 for other techniques.
     pub slot_windows: u64,

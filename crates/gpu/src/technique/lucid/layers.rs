@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use pellucid_core::Layers;
 use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, ShaderModule};
 
+use super::work::VARIES;
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
@@ -81,7 +82,7 @@ impl GatherLayers {
         let group = buffer_group(gpu, &self.buffers, &bindings);
         let pipeline = self.pipelines.entry((entry, stage.varies)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.buffers)];
-            let constants = [("varies", f64::from(u8::from(stage.varies)))];
+            let constants = [(VARIES, f64::from(u8::from(stage.varies)))];
             compute_pipeline(gpu, "gather", &self.module, entry, &layouts, &constants)
         });
         let mut pass = frame.compute_pass("gather")?;

@@ -287,6 +287,7 @@ impl Lucid {
         pass.dispatch_workgroups(1, 1, 1);
         drop(pass);
         frame.repaired_pixels += u64::from(header.counts.wrong);
+        frame.cut_pixels += u64::from(header.cut_pixels);
         if matches!(frame.goal, Goal::Layers(_)) {
             self.layers.read(frame, &stage, &self.layouts)?;
         }

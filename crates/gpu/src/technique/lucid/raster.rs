@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::Dispatch;
+use super::work::{Dispatch, FILTER_SIZE, VARIES};
 use super::{DepthFilter, OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::frame::Frame;
 use crate::pass::ordered::{compute_pipeline, resolve_code};
@@ -66,8 +66,8 @@ impl Raster {
                 let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.buffers)];
                 let constants = [
                     ("resolve", f64::from(code)),
-                    ("varies", f64::from(u8::from(stage.varies))),
-                    ("filter_size", f64::from(size)),
+                    (VARIES, f64::from(u8::from(stage.varies))),
+                    (FILTER_SIZE, f64::from(size)),
                     ("threshold", f64::from(threshold)),
                 ];
                 compute_pipeline(gpu, step, &self.module, entry, &layouts, &constants)

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::Dispatch;
+use super::work::{Dispatch, VARIES};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::frame::Frame;
 use crate::pass::ordered::{compute_pipeline, resolve_code};
@@ -41,7 +41,7 @@ impl Repair {
         let code = resolve_code(frame.resolve);
         let pipeline = self.pipelines.entry((code, stage.varies)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.buffers)];
-            let constants = [("resolve", f64::from(code)), ("varies", f64::from(u8::from(stage.varies)))];
+            let constants = [("resolve", f64::from(code)), (VARIES, f64::from(u8::from(stage.varies)))];
             compute_pipeline(gpu, "repair", &self.module, "main", &layouts, &constants)
         });
         let mut pass = frame.compute_pass("repair")?;

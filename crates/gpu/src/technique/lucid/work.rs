@@ -14,6 +14,11 @@ pub(super) const BIN: u64 = 32;
 /// Parts of a block that are sorted in workgroup memory. Twin: `CHUNK`.
 pub(super) const CHUNK: u64 = 1024;
 
+/// Constants of shaders by their numbers, as names of imported modules change when they are linked: `varies` in
+/// `shaders/technique/lucid/shade.wesl`, `filter_size` in `filter.wesl`.
+pub(super) const VARIES: &str = "1";
+pub(super) const FILTER_SIZE: &str = "2";
+
 pub(super) const WORK: &str = "work";
 pub(super) const RECORDS: &str = "triangles";
 pub(super) const PARTS: &str = "parts of triangles";
@@ -60,7 +65,9 @@ pub(super) struct Header {
     pub(super) first: Counts,
     /// Covered pixels, most fragments of one, all fragments (low and high word).
     pub(super) tally: [u32; 4],
-    pub(super) unused: [u32; 4],
+    /// Pixels of blocks that were left early.
+    pub(super) cut_pixels: u32,
+    pub(super) unused: [u32; 3],
 }
 
 const HEADER_WORDS: u64 = size_of::<Header>() as u64 / 4;
