@@ -5,4 +5,3 @@ pub(crate) mod opaque;
 pub(crate) mod ordered;
 pub(crate) mod picture;
 pub(crate) mod prefix_sum;
-pub(crate) mod whole_window;

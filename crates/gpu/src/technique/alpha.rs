@@ -5,13 +5,13 @@
 
 use pellucid_core::Resolve;
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, RenderPipeline, ShaderStages};
+use wgpu::{BindGroupLayout, ComputePipeline, ShaderStages};
 
 use super::{Capture, Layouts, Outcome};
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
-use crate::pass::whole_window::WholeWindow;
-use crate::surface::{SurfacePass, SurfacePipelines, depth_state};
+use crate::pass::ordered::{compute_pipeline, dispatch_window};
+use crate::surface::{SurfacePass, SurfacePipelines, depth_state, shader};
 use crate::{Context, GpuError, shaders};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -21,8 +21,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 pub(crate) struct Alpha {
     blend: SurfacePipelines,
     layout: BindGroupLayout,
-    compose: WholeWindow,
-    compose_pipeline: RenderPipeline,
+    compose: ComputePipeline,
     blended: Option<wgpu::Texture>,
 }
 
@@ -51,7 +50,7 @@ impl Alpha {
             label: Some("alpha"),
             entries: &[wgpu::BindGroupLayoutEntry {
                 binding: 0,
-                visibility: ShaderStages::FRAGMENT,
+                visibility: ShaderStages::COMPUTE,
                 ty: wgpu::BindingType::Texture {
                     sample_type: wgpu::TextureSampleType::Float { filterable: false },
                     view_dimension: wgpu::TextureViewDimension::D2,
@@ -60,9 +59,10 @@ impl Alpha {
                 count: None,
             }],
         });
-        let compose = WholeWindow::new(gpu, "compose", shaders::COMPOSE, Some(&layout));
-        let compose_pipeline = compose.pipeline(gpu, &[]);
-        Self { blend, layout, compose, compose_pipeline, blended: None }
+        let module = shader(gpu, "compose", shaders::COMPOSE);
+        let group_layouts = [Some(layouts.picture), None, None, Some(&layout)];
+        let compose = compute_pipeline(gpu, "compose", &module, "main", &group_layouts, &[]);
+        Self { blend, layout, compose, blended: None }
     }
 
     /// The texture that layers are blended into: kept while the picture's size stays the same.
@@ -106,7 +106,9 @@ impl Capture for Alpha {
             layout: &self.layout,
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) }],
         });
-        self.compose.record(frame, window, &self.compose_pipeline, Some(&group))?;
+        let mut pass = frame.compute_pass("compose")?;
+        pass.set_pipeline(&self.compose);
+        dispatch_window(&mut pass, frame, window, &group);
         Ok(Outcome::Done)
     }
 }
