@@ -20,10 +20,10 @@ impl<S: Simd> StripComposite<S> {
     /// As [`Composite::under`].
     #[inline(always)]
     fn under(&mut self, [red, green, blue, alpha]: [f32x8<S>; 4]) {
-        self.red = self.red + red * self.transmittance;
-        self.green = self.green + green * self.transmittance;
-        self.blue = self.blue + blue * self.transmittance;
-        self.transmittance = self.transmittance * (1.0 - alpha);
+        self.red += red * self.transmittance;
+        self.green += green * self.transmittance;
+        self.blue += blue * self.transmittance;
+        self.transmittance *= 1.0 - alpha;
     }
 }
 

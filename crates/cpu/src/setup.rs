@@ -191,7 +191,7 @@ impl Chunk {
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
                     for (block, covered) in blocks {
                         if covered != 0 && small.push(first + lane, corners, block, covered) {
-                            small.flush(simd, draw, span.draw as u32, vertices, grid, new);
+                            small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
                         }
                         if sight.has_one_block() {
                             break;
@@ -205,7 +205,7 @@ impl Chunk {
                 self.set_up_record(span.draw, draw, first + lane, triangles[lane], vertices, grid);
             }
         }
-        small.flush(simd, draw, span.draw as u32, vertices, grid, new);
+        small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
     }
 
     #[inline(always)]

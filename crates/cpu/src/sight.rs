@@ -56,7 +56,7 @@ impl Sight {
         let swapped = area.simd_lt(0);
         let mut small = hit & is_small & !area.simd_eq(0);
         if draw.culls_back_faces {
-            small = small & if draw.mirrored { !swapped } else { swapped };
+            small &= if draw.mirrored { !swapped } else { swapped };
         }
         let mut sight = Self {
             small: small.to_bitmask() as u32,
@@ -91,7 +91,7 @@ impl Sight {
                 sight.halves[block_row * 2 + block_column] = [low.into(), high.into()];
             }
         }
-        small = small & !any.simd_eq(0);
+        small &= !any.simd_eq(0);
         sight.small = small.to_bitmask() as u32;
         sight
     }
@@ -159,12 +159,12 @@ fn cover_block<S: Simd>(
         let (mut a_here, mut b_here, mut c_here) = (a_row, b_row, c_row);
         let mut covered = zero;
         for _ in 0..columns {
-            covered = covered | (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
-            bit = bit << 1;
+            covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+            bit <<= 1;
             (a_here, b_here, c_here) = (a_here + a.0, b_here + b.0, c_here + c.0);
         }
         let half = &mut halves[usize::from(row >= 4)];
-        *half = *half | covered;
+        *half |= covered;
         (a_row, b_row, c_row) = (a_row + a.1, b_row + b.1, c_row + c.1);
     }
     halves

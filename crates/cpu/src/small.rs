@@ -4,7 +4,7 @@
 //! first of all sixteen triangles in one go, then the second, and so on. All that is left for the tile is to order and
 //! blend them. A triangle that reaches several blocks of samples takes part once for each.
 
-use fearless_simd::{Simd, SimdBase, SimdInt, f32x16, i32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, f32x16, i32x16};
 use glam::Vec3;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
@@ -84,9 +84,23 @@ impl SmallTriangles {
         self.count == LANES
     }
 
-    /// Turns the triangles into fragments.
+    /// Turns the triangles into fragments. A function of its own: inlined into the loop over triangles, its conditions on
+    /// the draw would be taken out of that loop one by one, for minutes of compile time.
+    #[inline(never)]
+    pub(crate) fn flush(
+        &mut self,
+        level: Level,
+        draw: &Draw<'_>,
+        draw_number: u32,
+        vertices: DrawVertices<'_>,
+        grid: &TileGrid,
+        fragments: &mut NewFragments,
+    ) {
+        dispatch!(level, simd => self.flush_simd(simd, draw, draw_number, vertices, grid, fragments));
+    }
+
     #[inline(always)]
-    pub(crate) fn flush<S: Simd>(
+    fn flush_simd<S: Simd>(
         &mut self,
         simd: S,
         draw: &Draw<'_>,
