@@ -18,6 +18,15 @@ impl Image {
         Self { width, height, pixels: vec![color; width as usize * height as usize] }
     }
 
+    /// A picture of these pixels, row by row from the top.
+    ///
+    /// # Panics
+    /// If there are not exactly as many as the size says.
+    pub fn from_pixels(width: u32, height: u32, pixels: Vec<Vec4>) -> Self {
+        assert_eq!(pixels.len(), width as usize * height as usize, "pixels of {width} x {height}");
+        Self { width, height, pixels }
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width

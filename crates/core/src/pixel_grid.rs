@@ -69,6 +69,11 @@ impl Viewport {
         Self { width: view.width, height: view.height, half_x: half(view.width), half_y: half(view.height) }
     }
 
+    /// Half the picture in subpixels, in x and y.
+    pub fn half(&self) -> [i32; 2] {
+        [self.half_x, self.half_y]
+    }
+
     /// Guard band over half the picture, in x and y: a position is inside while |x| <= guard * w.
     pub fn guard(&self) -> [f32; 2] {
         let guard = (GUARD_BAND_PX * SUBPIXELS) as f32;
@@ -262,10 +267,11 @@ impl ScreenTriangle {
     }
 }
 
-/// A fragment's depth: a plane's value rounded to f32, inside the range of its triangle.
+/// A fragment's depth: a plane's value rounded to f32, inside the range of its triangle. Adding zero turns -0, whose bits
+/// would be in front of everything, into 0.
 #[inline(always)]
 pub fn depth_at(plane: &Plane, [least, greatest]: [f32; 2], x_from_anchor: i32, y_from_anchor: i32) -> f32 {
-    (plane.at(x_from_anchor, y_from_anchor) as f32).clamp(least, greatest)
+    (plane.at(x_from_anchor, y_from_anchor) as f32).clamp(least, greatest) + 0.0
 }
 
 #[cfg(test)]

@@ -93,7 +93,9 @@ impl Technique {
     /// Bytes it holds besides scene and picture, as a formula.
     pub fn memory_formula(self) -> &'static str {
         match self {
-            Self::Cpu => "16 B x vertices + 96 B x visible triangles + threads x fragments of a tile x 18 B",
+            Self::Cpu => {
+                "16 B x vertices + 18 B x small fragments + 104 B x larger triangles + threads x fragments of a tile x 28 B"
+            }
             Self::Oracle => "32 B x fragments",
             Self::Alpha => "8 B x pixels",
             Self::Peel => "44 B x pixels, 60 B for gelly and blend:corrected",

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use pellucid_core::pixel_grid::{SUBPIXELS, ScreenTriangle, ScreenVertex, Viewport, center};
 
+use crate::small::add_counts;
+
 /// Side of a tile in pixels. Small enough that the fragments of a tile with hundreds of layers stay in the second-level
 /// cache, large enough that small triangles rarely lie in two.
 pub(crate) const TILE_PX: u32 = 32;
@@ -11,7 +13,7 @@ pub(crate) const TILE_PX: u32 = 32;
 /// The tiles of a picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileGrid {
-    viewport: Viewport,
+    pub(crate) viewport: Viewport,
     /// Tiles side by side.
     pub(crate) columns: u32,
     /// Tiles one above another.
@@ -156,6 +158,11 @@ impl Bins {
         }
         let number = number as usize;
         &self.records[self.starts[number] as usize..self.starts[number + 1] as usize]
+    }
+
+    /// Adds how many records each tile has.
+    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
+        add_counts(&self.starts, counts);
     }
 
     /// Bytes held.

@@ -1,18 +1,22 @@
 //! The CPU renderer of Pellucid: exact transparency, tile by tile, on all cores, no GPU needed.
 //!
-//! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` turns
-//! triangles into records and `bin` hands them to tiles; `tile` captures, orders and resolves one tile through `raster`.
-//!
-//! Fragments live only while their tile is resolved, and hold 8 bytes each until then: depth and the number of their
-//! surface, together one sort key. Colour is computed after sorting, front to back.
+//! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` looks what
+//! is in `sight`, turns `small` triangles into fragments and others into records, and hands both to tiles through `bin`;
+//! `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a time.
 #![forbid(unsafe_code)]
 
 mod bin;
+mod blend;
 pub mod fbuffer;
+mod fragments;
+mod order;
 mod raster;
 mod renderer;
 mod setup;
+mod sight;
 pub mod simd;
+mod small;
+mod surfaces;
 mod tile;
 mod transform;
 

@@ -5,11 +5,16 @@
 //! with the whole tile inside is left out, and for any other one the value at a pixel of the tile is at most
 //! 31 * (2^23 + 2^23) from zero. A row of the tile is then a mask of 32 bits, made eight samples at a time.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, i32x8};
+use fearless_simd::{
+    Bytes, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdSplit, f32x8, f64x8, i32x8, mask32x8, u32x8,
+};
 use pellucid_core::pixel_grid::{Plane, ScreenTriangle, center};
 use pellucid_core::primitive::Fold;
+use pellucid_core::shading::NormalPlane;
 
 use crate::bin::{PixelRect, TILE_PX};
+use crate::fragments::Fragments;
+use crate::simd::light;
 
 /// An edge seen from a tile: not negative inside.
 #[derive(Clone, Copy, Default)]
@@ -33,6 +38,7 @@ pub(crate) struct Depths {
 }
 
 /// The samples of a tile that a triangle covers: rows `top..=bottom` of the tile, a bit for each column.
+#[derive(Default)]
 pub(crate) struct Coverage {
     pub(crate) top: usize,
     pub(crate) bottom: usize,
@@ -173,6 +179,85 @@ impl Depths {
     #[inline(always)]
     pub(crate) fn at(&self, row: f64, x: usize) -> f32 {
         let value = row + f64::from(self.left + x as i32) * self.plane.dx;
-        (value as f32).max(self.range[0]).min(self.range[1])
+        // Adding zero turns -0 into 0.
+        (value as f32).max(self.range[0]).min(self.range[1]) + 0.0
+    }
+}
+
+/// Makes the fragments of a triangle whose colour varies by light alone, eight of a row at a time.
+pub(crate) struct RowFragments<'a, S: Simd> {
+    depths: &'a Depths,
+    normal: &'a NormalPlane,
+    /// The brightness of all, if the normal is the same everywhere.
+    steady_light: Option<f32>,
+    /// 0 to 7.
+    ramp: f64x8<S>,
+    lanes: i32x8<S>,
+    /// Pixels from the anchor to the tile's top left pixel.
+    left: i32,
+    top: i32,
+}
+
+impl<'a, S: Simd> RowFragments<'a, S> {
+    #[inline(always)]
+    pub(crate) fn new(simd: S, depths: &'a Depths, normal: &'a NormalPlane, is_steady: bool) -> Self {
+        Self {
+            depths,
+            normal,
+            steady_light: is_steady.then(|| normal.light_at(0, 0)),
+            ramp: f64x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]),
+            lanes: i32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]),
+            left: depths.left,
+            top: depths.top,
+        }
+    }
+
+    /// Adds the fragments at the samples `mask` of row `y` of the tile, unless they lie behind the depths in `hidden`.
+    #[inline(always)]
+    pub(crate) fn add(
+        &self,
+        simd: S,
+        y: usize,
+        mask: u32,
+        hidden: Option<&[f32]>,
+        [source, primitive]: [u32; 2],
+        fragments: &mut Fragments,
+    ) {
+        let row = f64x8::splat(simd, self.depths.row(y));
+        let dx = f64x8::splat(simd, self.depths.plane.dx);
+        let [least, greatest] = self.depths.range;
+        let normal_row = self.normal.value + self.normal.dy * (self.top + y as i32) as f32;
+        let mut mask = u64::from(mask);
+        while mask != 0 {
+            let x = mask.trailing_zeros();
+            let mut bits = mask >> x & 0xFF;
+            mask &= !(0xFF << x);
+            let columns = self.ramp + f64::from(self.left + x as i32);
+            let (low, high) = (row + columns * dx).split();
+            // Adding zero turns -0 into 0.
+            let depth = low.narrow(high).max(least).min(greatest) + 0.0;
+            let sample = y * TILE_PX as usize + x as usize;
+            if let Some(hidden) = hidden {
+                let hidden = f32x8::from_slice(simd, &hidden[sample..sample + LANES as usize]);
+                bits &= depth.simd_ge(hidden).to_bitmask();
+            }
+            let light = match self.steady_light {
+                Some(light) => f32x8::splat(simd, light),
+                None => {
+                    let columns: f32x8<S> = (self.lanes + (self.left + x as i32)).to_float();
+                    let axis = |i: usize| columns * self.normal.dx[i] + normal_row[i];
+                    light(simd, [axis(0), axis(1), axis(2)])
+                }
+            };
+            let kept = mask32x8::from_bitmask(simd, bits);
+            let room = fragments.room(LANES as usize);
+            let samples: u32x8<S> = (self.lanes + sample as i32).compress(kept).bitcast();
+            samples.store_slice(room.samples);
+            depth.compress(kept).store_slice(room.depths);
+            light.compress(kept).store_slice(room.lights);
+            u32x8::splat(simd, source).store_slice(room.sources);
+            u32x8::splat(simd, primitive).store_slice(room.primitives);
+            fragments.advance(bits.count_ones() as usize);
+        }
     }
 }

@@ -1,22 +1,22 @@
 //! One frame, top to bottom.
 
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use fearless_simd::{Level, dispatch};
 use glam::Vec4;
-use pellucid_core::pixel_grid::{ScreenVertex, Viewport};
+use pellucid_core::pixel_grid::Viewport;
 use pellucid_core::primitive::{Draw, draws};
 use pellucid_core::resolve::{PixelResolver, finish};
 use pellucid_core::stats::Step;
-use pellucid_core::{Error, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View};
+use pellucid_core::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bin::{TILE_PX, TileGrid};
-use crate::setup::{Chunk, chunk_spans};
-use crate::tile::{FragmentCounts, FrameParts, TileCapture};
-use crate::transform::{groups, transform};
+use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
+use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
+use crate::transform::{Vertices, groups};
 
 /// Renders on all cores. Keep it from frame to frame: it holds on to its threads and memory.
 #[derive(Debug)]
@@ -30,15 +30,37 @@ pub struct CpuRenderer {
 /// What is kept from frame to frame.
 #[derive(Debug, Default)]
 struct Memory {
-    vertices: Vec<ScreenVertex>,
-    vertex_starts: Vec<usize>,
+    vertices: Vertices,
+    scratches: Vec<SetupScratch>,
     chunks: Vec<Chunk>,
-    captures: Vec<TileCapture>,
+    workers: Vec<Worker>,
+}
+
+/// What one thread needs to turn one tile after another into pixels.
+#[derive(Debug, Default)]
+struct Worker {
+    capture: TileCapture,
+    buffers: TileBuffers,
+}
+
+/// A tile's results.
+#[derive(Debug)]
+struct TileBuffers {
+    layers: Layers,
+    /// Row by row of the tile's samples.
+    pixels: Box<[Vec4; TILE_SAMPLES]>,
+}
+
+impl Default for TileBuffers {
+    fn default() -> Self {
+        Self { layers: Layers::default(), pixels: Box::new([Vec4::ZERO; TILE_SAMPLES]) }
+    }
 }
 
 /// A scene's triangles in the bins of its tiles.
 struct Binned<'a> {
     draws: Vec<Draw<'a>>,
+    palette: Vec<Vec4>,
     grid: TileGrid,
     chunks: Vec<Chunk>,
     level: Level,
@@ -67,27 +89,33 @@ impl CpuRenderer {
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
         self.run(|memory| {
             let mut binned = bin_scene(scene, view, self.level, memory)?;
-            let mut image = Image::filled(view.width, view.height, Vec4::ZERO);
-            let tiles = Mutex::new(tile_rows(&mut image, &binned.grid));
+            let mut image = filled(view);
+            let bands: Vec<Mutex<&mut [Vec4]>> =
+                image.pixels_mut().chunks_mut(TILE_PX as usize * view.width as usize).map(Mutex::new).collect();
             let resolver = PixelResolver::new(resolve, view);
             let frame = binned.parts();
-            let (counts, bytes) = for_each_tile(&binned, memory, |number, capture, layers| {
-                let mut rows = {
-                    let mut tiles = tiles.lock().unwrap_or_else(PoisonError::into_inner);
-                    std::mem::take(&mut tiles[number as usize])
-                };
+            let (counts, bytes) = for_each_tile(&binned, memory, |number, capture, buffers| {
                 if resolve == Resolve::Blend {
-                    capture.blend(frame, view.background, &mut rows);
-                    return;
-                }
-                capture.layers(frame.draws, layers);
-                for (y, row) in rows.iter_mut().enumerate() {
-                    for (x, pixel) in row.iter_mut().enumerate() {
-                        let (x, y) = (x as u32, y as u32);
-                        *pixel = resolver.pixel(layers.pixel(x, y), layers.opaque(x, y));
+                    if capture.fragments.len() == 0 && !capture.has_opaque {
+                        return;
+                    }
+                    capture.blend(frame, view.background, &mut buffers.pixels);
+                } else {
+                    capture.layers(frame, &mut buffers.layers);
+                    let layers = &buffers.layers;
+                    for (sample, x, y) in capture.pixels() {
+                        let (x, y) = ((x - capture.rect.left) as u32, (y - capture.rect.top) as u32);
+                        buffers.pixels[sample] = resolver.pixel(layers.pixel(x, y), layers.opaque(x, y));
                     }
                 }
+                let left = capture.rect.left as usize;
+                let width = (capture.rect.right - capture.rect.left + 1) as usize;
+                let mut band = lock(&bands[(number / binned.grid.columns) as usize]);
+                for (to, from) in band.chunks_mut(view.width as usize).zip(buffers.pixels.chunks(TILE_PX as usize)) {
+                    to[left..left + width].copy_from_slice(&from[..width]);
+                }
             });
+            drop(bands);
             let stats = binned.finish(counts, bytes, memory, scene);
             finish(resolve, &mut image, &stats);
             Ok(Frame { image, stats })
@@ -103,9 +131,9 @@ impl CpuRenderer {
         self.run(|memory| {
             let mut binned = bin_scene(scene, view, self.level, memory)?;
             let frame = binned.parts();
-            let (counts, bytes) = for_each_tile(&binned, memory, |_, capture, layers| {
-                capture.layers(frame.draws, layers);
-                visit(layers);
+            let (counts, bytes) = for_each_tile(&binned, memory, |_, capture, buffers| {
+                capture.layers(frame, &mut buffers.layers);
+                visit(&buffers.layers);
             });
             Ok(binned.finish(counts, bytes, memory, scene))
         })
@@ -138,27 +166,32 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
     let viewport = Viewport::of(view);
     let grid = TileGrid::new(viewport);
     let mut chunks = std::mem::take(&mut memory.chunks);
+    let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
+    let chunk_triangles = chunk_triangles(scene.primitive_count() as usize, rayon::current_num_threads());
     let mut used = 0;
     let (mut transform_ms, mut setup_ms) = (0.0, 0.0);
     for group in groups(&draws) {
         let transform_start = Instant::now();
         let group_draws = &draws[group.draws.clone()];
-        transform(group_draws, &viewport, level, &mut memory.vertices, &mut memory.vertex_starts);
+        memory.vertices.transform(group_draws, &viewport, level);
         let setup_start = Instant::now();
-        let spans = chunk_spans(group_draws, group.draws.start);
+        let spans = chunk_spans(group_draws, group.draws.start, chunk_triangles);
         if chunks.len() < used + spans.len() {
             chunks.resize_with(used + spans.len(), Chunk::default);
         }
-        let (vertices, starts) = (&memory.vertices, &memory.vertex_starts);
+        let vertices = &memory.vertices;
         chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
-            let screen_vertices = |draw: usize| &vertices[starts[draw - group.draws.start]..];
-            dispatch!(level, _simd => chunk.fill(spans, &draws, screen_vertices, &viewport, &grid));
+            let draw_vertices = |draw: usize| vertices.draw(draw - group.draws.start);
+            let mut scratch = lock(&scratches).pop().unwrap_or_default();
+            dispatch!(level, simd => chunk.fill(simd, spans, &draws, draw_vertices, &grid, &mut scratch));
+            lock(&scratches).push(scratch);
         });
         used += spans.len();
         transform_ms += (setup_start - transform_start).as_secs_f64() * 1e3;
         setup_ms += setup_start.elapsed().as_secs_f64() * 1e3;
     }
     chunks.truncate(used);
+    memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);
     let threads = rayon::current_num_threads();
     let device = format!("CPU, {threads} thread{}", if threads == 1 { "" } else { "s" });
     let mut stats = Stats::new(Technique::Cpu, device, view.width, view.height);
@@ -166,7 +199,8 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
     stats.dropped_triangles = chunks.iter().map(|chunk| chunk.dropped_triangles).sum();
     stats.steps =
         vec![Step { name: "transform", ms: transform_ms }, Step { name: "clip, setup and bin", ms: setup_ms }];
-    Ok(Binned { draws, grid, chunks, level, stats, start })
+    let palette = std::iter::once(Vec4::ZERO).chain(draws.iter().map(|draw| draw.base_color)).collect();
+    Ok(Binned { draws, palette, grid, chunks, level, stats, start })
 }
 
 /// Captures every tile and hands it to `resolve`, on all threads, the dearest tiles first. Returns the figures of all and
@@ -174,53 +208,55 @@ fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memor
 fn for_each_tile(
     binned: &Binned<'_>,
     memory: &mut Memory,
-    resolve: impl Fn(u32, &TileCapture, &mut Layers) + Sync,
+    resolve: impl Fn(u32, &TileCapture, &mut TileBuffers) + Sync,
 ) -> (FragmentCounts, usize) {
-    let costs: Vec<usize> = (0..binned.grid.tile_count() as u32)
-        .map(|tile| {
-            binned.chunks.iter().map(|chunk| chunk.opaque.tile(tile).len() + chunk.transparent.tile(tile).len()).sum()
-        })
-        .collect();
+    let mut costs = vec![0; binned.grid.tile_count()];
+    for chunk in &binned.chunks {
+        chunk.opaque.add_counts(&mut costs);
+        chunk.transparent.add_counts(&mut costs);
+    }
     let mut tiles: Vec<u32> = (0..binned.grid.tile_count() as u32).collect();
-    tiles.sort_by_key(|&tile| std::cmp::Reverse(costs[tile as usize]));
-    let spare = Mutex::new(std::mem::take(&mut memory.captures));
-    let lock = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+    tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(costs[tile as usize]));
+    let spare = Mutex::new(std::mem::take(&mut memory.workers));
     let next = std::sync::atomic::AtomicUsize::new(0);
     let results = Mutex::new((FragmentCounts::default(), 0));
     rayon::broadcast(|_| {
-        let mut capture = lock().pop().unwrap_or_default();
-        let mut layers = Layers::default();
+        let mut worker = lock(&spare).pop().unwrap_or_default();
         let mut counts = FragmentCounts::default();
         while let Some(&tile) = tiles.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed)) {
-            counts = counts.merged(capture.capture(tile, binned.parts()));
-            resolve(tile, &capture, &mut layers);
+            counts = counts.merged(worker.capture.capture(tile, binned.parts()));
+            resolve(tile, &worker.capture, &mut worker.buffers);
         }
-        let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut results = lock(&results);
         results.0 = results.0.merged(counts);
-        results.1 += capture.bytes() + layers.fragments.capacity() * size_of::<pellucid_core::Fragment>();
-        lock().push(capture);
+        results.1 += worker.capture.bytes() + worker.buffers.layers.fragments.capacity() * size_of::<Fragment>();
+        lock(&spare).push(worker);
     });
-    memory.captures = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
+    memory.workers = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
     results.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// For each tile, its rows of pixels in the picture.
-fn tile_rows<'i>(image: &'i mut Image, grid: &TileGrid) -> Vec<Vec<&'i mut [Vec4]>> {
-    let width = image.width() as usize;
-    let mut tiles: Vec<Vec<&mut [Vec4]>> =
-        (0..grid.tile_count()).map(|_| Vec::with_capacity(TILE_PX as usize)).collect();
-    for (y, row) in image.pixels_mut().chunks_mut(width).enumerate() {
-        let first = y / TILE_PX as usize * grid.columns as usize;
-        for (column, pixels) in row.chunks_mut(TILE_PX as usize).enumerate() {
-            tiles[first + column].push(pixels);
-        }
-    }
-    tiles
+/// What a mutex guards. A panic elsewhere ends the frame anyway.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A picture of the background, made by all threads.
+fn filled(view: &View) -> Image {
+    let background = view.background;
+    let pixels = (0..view.width as usize * view.height as usize).into_par_iter().with_min_len(1 << 15);
+    Image::from_pixels(view.width, view.height, pixels.map(|_| background).collect())
 }
 
 impl Binned<'_> {
     fn parts(&self) -> FrameParts<'_> {
-        FrameParts { chunks: &self.chunks, draws: &self.draws, grid: &self.grid, level: self.level }
+        FrameParts {
+            chunks: &self.chunks,
+            draws: &self.draws,
+            palette: &self.palette,
+            grid: &self.grid,
+            level: self.level,
+        }
     }
 
     /// Completes the figures and gives the memory back.
@@ -235,8 +271,8 @@ impl Binned<'_> {
         stats.max_depth_complexity = counts.greatest;
         stats.mean_depth_complexity = counts.fragments as f64 / counts.covered_pixels.max(1) as f64;
         let chunk_bytes: usize = self.chunks.iter().map(Chunk::bytes).sum();
-        let vertex_bytes = memory.vertices.capacity() * size_of::<ScreenVertex>();
-        stats.peak_bytes = (chunk_bytes + vertex_bytes + capture_bytes) as u64;
+        let scratch_bytes: usize = memory.scratches.iter().map(SetupScratch::bytes).sum();
+        stats.peak_bytes = (chunk_bytes + scratch_bytes + memory.vertices.bytes() + capture_bytes) as u64;
         memory.chunks = std::mem::take(&mut self.chunks);
         stats
     }

@@ -1,11 +1,15 @@
-//! Triangles to records: what is in sight and may cover a sample, ready for the tiles.
+//! Triangles to what tiles need: small ones to fragments, others to records; what is out of sight or covers no sample is
+//! left out, sixteen triangles at a time, before more than its position on the screen is read.
 
-use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, outcode, twice_signed_area};
+use fearless_simd::Simd;
+use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, outcode, twice_signed_area};
 use pellucid_core::primitive::{Corners, Draw, Fold, Pass, Piece};
 use pellucid_core::shading::CornerNormals;
 
 use crate::bin::{Bins, TileGrid};
-use crate::transform;
+use crate::sight::Sight;
+use crate::small::{LANES, MOST_FRAGMENTS, NewFragments, SmallFragments, SmallTriangles};
+use crate::transform::{DrawVertices, outcode};
 
 /// A triangle in sight, or a piece of a clipped one.
 #[derive(Debug, Clone, Copy)]
@@ -22,12 +26,12 @@ pub(crate) struct Record {
     pub(crate) fold: Fold,
 }
 
-/// [`Corners`] in 4 bytes: the weights of clipped ones stand in a table.
+/// [`Corners`] in 8 bytes: the weights of clipped ones stand in a table.
 #[derive(Debug, Clone, Copy)]
 enum RecordCorners {
     Whole,
     Swapped,
-    Clipped(u16),
+    Clipped(u32),
 }
 
 /// Triangles set up by one thread in one go, in draw order.
@@ -35,9 +39,42 @@ enum RecordCorners {
 pub(crate) struct Chunk {
     records: Vec<Record>,
     clipped: Vec<[glam::Vec3; 3]>,
-    pub(crate) opaque: Bins,
-    pub(crate) transparent: Bins,
+    pub(crate) opaque: PassBins,
+    pub(crate) transparent: PassBins,
     pub(crate) dropped_triangles: u64,
+}
+
+/// What a chunk has for the tiles, in one pass of the frame. Draw order runs through both.
+#[derive(Debug, Default)]
+pub(crate) struct PassBins {
+    pub(crate) records: Bins,
+    pub(crate) small: SmallFragments,
+}
+
+impl PassBins {
+    /// Adds how much each tile has to do.
+    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
+        self.records.add_counts(counts);
+        self.small.add_counts(counts);
+    }
+
+    fn bytes(&self) -> usize {
+        self.records.bytes() + self.small.bytes()
+    }
+}
+
+/// What a thread needs to fill one chunk after another.
+#[derive(Debug, Default)]
+pub(crate) struct SetupScratch {
+    opaque: NewFragments,
+    transparent: NewFragments,
+}
+
+impl SetupScratch {
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.opaque.bytes() + self.transparent.bytes()
+    }
 }
 
 /// Triangles of one draw that a chunk sets up.
@@ -51,14 +88,14 @@ pub(crate) struct Span {
     pub(crate) count: usize,
 }
 
-/// Most triangles in a chunk. Each may leave [`MAX_PIECES`] pieces, which must be numbered in 16 bits.
-pub(crate) const CHUNK_TRIANGLES: usize = 8192;
+/// Triangles in a chunk: enough for each thread to get many, so that all end at about the same time, but not so many that
+/// what is between set-up and tiles leaves the second-level cache, nor so few that tiles find little in each.
+pub(crate) fn chunk_triangles(total: usize, threads: usize) -> usize {
+    (total / (threads * 16)).clamp(1024, 16_384)
+}
 
-const MAX_PIECES: usize = pellucid_core::clip::MAX_CLIPPED_VERTICES - 2;
-const _: () = assert!(CHUNK_TRIANGLES * MAX_PIECES <= u16::MAX as usize);
-
-/// Cuts the triangles of a group's draws into chunks.
-pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span>> {
+/// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.
+pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize, chunk_triangles: usize) -> Vec<Vec<Span>> {
     let mut chunks: Vec<Vec<Span>> = Vec::new();
     let mut room = 0;
     for (i, draw) in draws.iter().enumerate() {
@@ -67,7 +104,7 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span
         while first < total {
             if room == 0 {
                 chunks.push(Vec::new());
-                room = CHUNK_TRIANGLES;
+                room = chunk_triangles;
             }
             let count = (total - first).min(room);
             if let Some(chunk) = chunks.last_mut() {
@@ -81,80 +118,148 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize) -> Vec<Vec<Span
 }
 
 impl Chunk {
-    /// Sets up the triangles of `spans`; `screen_vertices` gives the transformed vertices of a draw.
+    /// Sets up the triangles of `spans`; `draw_vertices` gives the transformed vertices of a draw.
     #[inline(always)]
-    pub(crate) fn fill<'v>(
+    pub(crate) fn fill<'v, S: Simd>(
         &mut self,
+        simd: S,
         spans: &[Span],
         draws: &[Draw<'_>],
-        screen_vertices: impl Fn(usize) -> &'v [ScreenVertex],
-        viewport: &Viewport,
+        draw_vertices: impl Fn(usize) -> DrawVertices<'v>,
         grid: &TileGrid,
+        scratch: &mut SetupScratch,
     ) {
         self.records.clear();
         self.clipped.clear();
         self.dropped_triangles = 0;
-        self.opaque.begin();
-        self.transparent.begin();
+        self.opaque.records.begin();
+        self.transparent.records.begin();
         for span in spans {
-            self.set_up(span, &draws[span.draw], screen_vertices(span.draw), viewport, grid);
+            let draw = &draws[span.draw];
+            let new = match draw.pass {
+                Pass::Opaque => &mut scratch.opaque,
+                Pass::Transparent => &mut scratch.transparent,
+            };
+            self.set_up(simd, span, draw, draw_vertices(span.draw), grid, new);
         }
-        self.opaque.finish(grid);
-        self.transparent.finish(grid);
+        self.opaque.records.finish(grid);
+        self.transparent.records.finish(grid);
+        self.opaque.small.take(&mut scratch.opaque, grid);
+        self.transparent.small.take(&mut scratch.transparent, grid);
     }
 
     #[inline(always)]
-    fn set_up(
+    fn set_up<S: Simd>(
         &mut self,
+        simd: S,
         span: &Span,
         draw: &Draw<'_>,
-        vertices: &[ScreenVertex],
-        viewport: &Viewport,
+        vertices: DrawVertices<'_>,
         grid: &TileGrid,
+        new: &mut NewFragments,
     ) {
         let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
-        for (triangle, indices) in (span.first..).zip(triangles) {
-            let mut corners = indices.map(|vertex| vertices[vertex as usize]);
-            let codes = [0, 1, 2].map(|i| transform::outcode(&corners[i]));
-            let any = codes[0] | codes[1] | codes[2];
-            if any != 0 {
-                if any & outcode::NOT_FINITE != 0 {
-                    self.dropped_triangles += 1;
-                } else if codes[0] & codes[1] & codes[2] == 0 {
-                    self.set_up_clipped(span.draw, draw, triangle, viewport, grid);
+        let mut small = SmallTriangles::default();
+        let mut corners = [[[0; 2]; LANES]; 3];
+        for (first, triangles) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)) {
+            if triangles.len() < LANES {
+                // Triangles without area, which are never in sight.
+                corners = [[[0; 2]; LANES]; 3];
+            }
+            for (lane, indices) in triangles.iter().enumerate() {
+                for (corners, &vertex) in corners.iter_mut().zip(indices) {
+                    corners[lane] = vertices.positions[vertex as usize];
                 }
-                continue;
             }
-            let area = twice_signed_area(corners);
-            if area == 0 || !draw.shows_side(area) {
-                continue;
-            }
-            let kind = if area < 0 {
-                corners.swap(1, 2);
-                RecordCorners::Swapped
+            let sight = Sight::new(simd, &corners, draw, grid);
+            let mut records = sight.others;
+            if draw.varies() {
+                records |= sight.small;
             } else {
-                RecordCorners::Whole
-            };
-            self.push(span.draw, draw, triangle, corners, kind, Fold::None, grid);
+                let mut lanes = sight.small;
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    let blocks = sight.blocks(lane);
+                    if !sight.has_one_block()
+                        && blocks.iter().map(|(_, covered)| covered.count_ones()).sum::<u32>() > MOST_FRAGMENTS
+                    {
+                        records |= 1 << lane;
+                        continue;
+                    }
+                    let [a, b, c] = triangles[lane];
+                    let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
+                    for (block, covered) in blocks {
+                        if covered != 0 && small.push(first + lane, corners, block, covered) {
+                            small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
+                        }
+                        if sight.has_one_block() {
+                            break;
+                        }
+                    }
+                }
+            }
+            while records != 0 {
+                let lane = records.trailing_zeros() as usize;
+                records &= records - 1;
+                self.set_up_record(span.draw, draw, first + lane, triangles[lane], vertices, grid);
+            }
+        }
+        small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
+    }
+
+    #[inline(always)]
+    fn bins(&mut self, pass: Pass) -> &mut PassBins {
+        match pass {
+            Pass::Opaque => &mut self.opaque,
+            Pass::Transparent => &mut self.transparent,
         }
     }
 
-    #[cold]
-    fn set_up_clipped(
+    /// Sets up a triangle that is not small, or whose colour varies.
+    #[inline(never)]
+    fn set_up_record(
         &mut self,
         draw_number: usize,
         draw: &Draw<'_>,
         triangle: usize,
-        viewport: &Viewport,
+        indices: [u32; 3],
+        vertices: DrawVertices<'_>,
         grid: &TileGrid,
     ) {
-        for piece in draw.pieces(triangle, viewport).unwrap_or_default() {
+        let codes = indices.map(|vertex| outcode(vertices.positions[vertex as usize]));
+        let any = codes[0] | codes[1] | codes[2];
+        if any != 0 {
+            if any & outcode::NOT_FINITE != 0 {
+                self.dropped_triangles += 1;
+            } else if codes[0] & codes[1] & codes[2] == 0 {
+                self.set_up_clipped(draw_number, draw, triangle, grid);
+            }
+            return;
+        }
+        let mut corners = indices.map(|vertex| vertices.vertex(vertex));
+        let area = twice_signed_area(corners);
+        if area == 0 || !draw.shows_side(area) {
+            return;
+        }
+        let kind = if area < 0 {
+            corners.swap(1, 2);
+            RecordCorners::Swapped
+        } else {
+            RecordCorners::Whole
+        };
+        self.push(draw_number, draw, triangle, corners, kind, Fold::None, grid);
+    }
+
+    #[cold]
+    fn set_up_clipped(&mut self, draw_number: usize, draw: &Draw<'_>, triangle: usize, grid: &TileGrid) {
+        for piece in draw.pieces(triangle, &grid.viewport).unwrap_or_default() {
             let kind = match piece.corners {
                 Corners::Whole { swapped: false } => RecordCorners::Whole,
                 Corners::Whole { swapped: true } => RecordCorners::Swapped,
                 Corners::Clipped(weights) => {
                     self.clipped.push(weights);
-                    RecordCorners::Clipped((self.clipped.len() - 1) as u16)
+                    RecordCorners::Clipped((self.clipped.len() - 1) as u32)
                 }
             };
             self.push(draw_number, draw, triangle, piece.triangle.vertices, kind, piece.fold, grid);
@@ -176,11 +281,8 @@ impl Chunk {
         if samples.is_single() && !covers(&vertices, samples.left, samples.top) {
             return;
         }
-        let bins = match draw.pass {
-            Pass::Opaque => &mut self.opaque,
-            Pass::Transparent => &mut self.transparent,
-        };
-        bins.add(self.records.len() as u32, &vertices, samples, grid);
+        let number = self.records.len() as u32;
+        self.bins(draw.pass).records.add(number, &vertices, samples, grid);
         let normals = CornerNormals::new(draw, triangle, &vertices, &self.corners(corners));
         self.records.push(Record {
             vertices,

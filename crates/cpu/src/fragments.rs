@@ -1,0 +1,152 @@
+//! The transparent fragments of a tile, as structure of arrays.
+
+use crate::small::SmallFragment;
+
+/// Fragments in draw order. Numbers start at 1, so that 0 can stand for none.
+#[derive(Debug)]
+pub(crate) struct Fragments {
+    /// One more than the last number; beyond is room.
+    end: usize,
+    samples: Vec<u32>,
+    depths: Vec<f32>,
+    lights: Vec<f32>,
+    sources: Vec<u32>,
+    primitives: Vec<u32>,
+}
+
+/// One of them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileFragment {
+    pub(crate) depth: f32,
+    /// Brightness, where the source does not know.
+    pub(crate) light: f32,
+    /// Where its colour comes from, see [`SURFACE`](crate::tile::SURFACE).
+    pub(crate) source: u32,
+    pub(crate) primitive: u32,
+}
+
+/// Where up to a vector of fragments can be put.
+pub(crate) struct Room<'a> {
+    pub(crate) samples: &'a mut [u32],
+    pub(crate) depths: &'a mut [f32],
+    pub(crate) lights: &'a mut [f32],
+    pub(crate) sources: &'a mut [u32],
+    pub(crate) primitives: &'a mut [u32],
+}
+
+impl Default for Fragments {
+    fn default() -> Self {
+        let mut fragments = Self {
+            end: 1,
+            samples: Vec::new(),
+            depths: Vec::new(),
+            lights: Vec::new(),
+            sources: Vec::new(),
+            primitives: Vec::new(),
+        };
+        fragments.make_room(1);
+        fragments
+    }
+}
+
+impl Fragments {
+    pub(crate) fn clear(&mut self) {
+        self.end = 1;
+    }
+
+    #[inline(always)]
+    fn make_room(&mut self, count: usize) {
+        if self.depths.len() < self.end + count {
+            self.grow(count);
+        }
+    }
+
+    #[cold]
+    fn grow(&mut self, count: usize) {
+        let room = (self.end + count).next_power_of_two().max(4096);
+        self.samples.resize(room, 0);
+        self.depths.resize(room, 0.0);
+        self.lights.resize(room, 0.0);
+        self.sources.resize(room, 0);
+        self.primitives.resize(room, 0);
+    }
+
+    /// Room for so many; [`Self::advance`] tells how many were put there.
+    #[inline(always)]
+    pub(crate) fn room(&mut self, count: usize) -> Room<'_> {
+        self.make_room(count);
+        let range = self.end..self.end + count;
+        Room {
+            samples: &mut self.samples[range.clone()],
+            depths: &mut self.depths[range.clone()],
+            lights: &mut self.lights[range.clone()],
+            sources: &mut self.sources[range.clone()],
+            primitives: &mut self.primitives[range],
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn advance(&mut self, count: usize) {
+        self.end += count;
+    }
+
+    #[inline(always)]
+    pub(crate) fn push(&mut self, sample: u32, depth: f32, light: f32, source: u32, primitive: u32) {
+        self.make_room(1);
+        self.samples[self.end] = sample;
+        self.depths[self.end] = depth;
+        self.lights[self.end] = light;
+        self.sources[self.end] = source;
+        self.primitives[self.end] = primitive;
+        self.end += 1;
+    }
+
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, small: &[SmallFragment], samples: &[u16]) {
+        if small.is_empty() {
+            return;
+        }
+        let room = self.room(small.len());
+        for (to, from) in room.samples.iter_mut().zip(samples) {
+            *to = u32::from(*from);
+        }
+        for ((((depth, light), source), primitive), from) in
+            room.depths.iter_mut().zip(room.lights).zip(room.sources).zip(room.primitives).zip(small)
+        {
+            (*depth, *light, *source, *primitive) = (from.depth, from.light, from.draw + 1, from.primitive);
+        }
+        self.end += small.len();
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.end - 1
+    }
+
+    /// Samples and depths; number 0 among them.
+    #[inline(always)]
+    pub(crate) fn samples_and_depths(&self) -> (&[u32], &[f32]) {
+        (&self.samples[..self.end], &self.depths[..self.end])
+    }
+
+    /// Brightness and source of each; number 0 among them, dark and without source.
+    #[inline(always)]
+    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32]) {
+        (&self.lights[..self.end], &self.sources[..self.end])
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&self, number: u32) -> TileFragment {
+        let number = number as usize;
+        TileFragment {
+            depth: self.depths[number],
+            light: self.lights[number],
+            source: self.sources[number],
+            primitive: self.primitives[number],
+        }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.depths.capacity() * 20
+    }
+}

@@ -1,0 +1,392 @@
+//! Small triangles to fragments, sixteen triangles at a time.
+//!
+//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up: the
+//! first of all sixteen triangles in one go, then the second, and so on. All that is left for the tile is to order and
+//! blend them. A triangle that reaches several blocks of samples takes part once for each.
+
+use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, f32x16, i32x16};
+use glam::Vec3;
+use pellucid_core::pixel_grid::{SUBPIXELS, center};
+use pellucid_core::primitive::Draw;
+
+use crate::bin::{TILE_PX, TileGrid};
+use crate::simd::{Wide, light};
+use crate::transform::DrawVertices;
+
+pub(crate) const LANES: usize = 16;
+
+/// Side of a block of samples.
+pub(crate) const BLOCK_PX: i32 = 8;
+
+/// Most fragments of a small triangle. One that has more is a record: it takes less room, and a tile makes fragments side
+/// by side as fast.
+pub(crate) const MOST_FRAGMENTS: u32 = 32;
+
+/// Bits of a sample's number in its tile.
+const SAMPLE_BITS: u32 = 10;
+const _: () = assert!(1 << SAMPLE_BITS == TILE_PX * TILE_PX);
+
+/// A fragment of a small triangle.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SmallFragment {
+    pub(crate) depth: f32,
+    /// Brightness of its surface.
+    pub(crate) light: f32,
+    pub(crate) primitive: u32,
+    /// Number of the draw.
+    pub(crate) draw: u32,
+}
+
+/// Fragments of small triangles as they come, in draw order. A thread's, used again for every chunk.
+#[derive(Debug, Default)]
+pub(crate) struct NewFragments {
+    /// Tile and sample of each.
+    places: Vec<u32>,
+    fragments: Vec<SmallFragment>,
+    /// How many have come; beyond is room.
+    count: usize,
+}
+
+/// Fragments of small triangles by tile, in draw order.
+#[derive(Debug, Default)]
+pub(crate) struct SmallFragments {
+    starts: Vec<u32>,
+    samples: Vec<u16>,
+    fragments: Vec<SmallFragment>,
+}
+
+/// Small triangles, or blocks of them, that wait to be sixteen.
+#[derive(Debug, Default)]
+pub(crate) struct SmallTriangles {
+    count: usize,
+    /// Corners, clockwise on the screen.
+    corners: [[u32; 3]; LANES],
+    /// Number of the triangle in the draw's mesh.
+    triangles: [u32; LANES],
+    /// The first sample of the block ...
+    left: [i32; LANES],
+    top: [i32; LANES],
+    /// ... and which ones of it are covered, row by row.
+    covered: [u64; LANES],
+}
+
+impl SmallTriangles {
+    /// Adds a triangle; returns whether there are sixteen.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {
+        let lane = self.count;
+        self.corners[lane] = corners;
+        self.triangles[lane] = triangle as u32;
+        self.left[lane] = left;
+        self.top[lane] = top;
+        self.covered[lane] = covered;
+        self.count += 1;
+        self.count == LANES
+    }
+
+    /// Turns the triangles into fragments. A function of its own: inlined into the loop over triangles, its conditions on
+    /// the draw would be taken out of that loop one by one, for minutes of compile time.
+    #[inline(never)]
+    pub(crate) fn flush(
+        &mut self,
+        level: Level,
+        draw: &Draw<'_>,
+        draw_number: u32,
+        vertices: DrawVertices<'_>,
+        grid: &TileGrid,
+        fragments: &mut NewFragments,
+    ) {
+        dispatch!(level, simd => self.flush_simd(simd, draw, draw_number, vertices, grid, fragments));
+    }
+
+    #[inline(always)]
+    fn flush_simd<S: Simd>(
+        &mut self,
+        simd: S,
+        draw: &Draw<'_>,
+        draw_number: u32,
+        vertices: DrawVertices<'_>,
+        grid: &TileGrid,
+        fragments: &mut NewFragments,
+    ) {
+        let triangle_count = std::mem::take(&mut self.count);
+        if triangle_count == 0 {
+            return;
+        }
+        // The planes of weights and of depth, as `ScreenTriangle` has them.
+        let corners = &self.corners[..triangle_count];
+        let a: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 0, vertices.positions);
+        let b: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 1, vertices.positions);
+        let c: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 2, vertices.positions);
+        let (anchor_x, anchor_y) = (a.0 >> 8, a.1 >> 8);
+        let anchor = ((anchor_x << 8) + center(0), (anchor_y << 8) + center(0));
+        let area = (b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1);
+        let inv_area = Wide::splat(simd, 1.0) / Wide::from_small_int(area);
+        let second = WidePlane::weight(simd, c, a, anchor, inv_area);
+        let third = WidePlane::weight(simd, a, b, anchor, inv_area);
+        let (a_z, a_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 0, vertices.depths);
+        let (b_z, b_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 1, vertices.depths);
+        let (c_z, c_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 2, vertices.depths);
+        let (least, greatest) = (a_z.min(b_z).min(c_z), a_z.max(b_z).max(c_z));
+        let first_z = Wide::from_f32(a_z);
+        let (to_second, to_third) = (Wide::from_f32(b_z) - first_z, Wide::from_f32(c_z) - first_z);
+        let depth_plane = WidePlane {
+            value: first_z + (second.value * to_second + third.value * to_third),
+            dx: second.dx * to_second + third.dx * to_third,
+            dy: second.dy * to_second + third.dy * to_third,
+        };
+
+        let mut steady_light = f32x16::splat(simd, 1.0);
+        let mut normal_planes = None;
+        if draw.lit
+            && let Some(normals) = draw.mesh.normals()
+        {
+            let a = in_view(draw, gather(simd, corners, |corners| normals[corners[0] as usize]));
+            let b = in_view(draw, gather(simd, corners, |corners| normals[corners[1] as usize]));
+            let c = in_view(draw, gather(simd, corners, |corners| normals[corners[2] as usize]));
+            let weights = [second.to_f32(), third.to_f32()];
+            normal_planes = Some([
+                normal_plane(a[0] * a_inv_w, b[0] * b_inv_w, c[0] * c_inv_w, &weights),
+                normal_plane(a[1] * a_inv_w, b[1] * b_inv_w, c[1] * c_inv_w, &weights),
+                normal_plane(a[2] * a_inv_w, b[2] * b_inv_w, c[2] * c_inv_w, &weights),
+            ]);
+        } else if draw.lit {
+            let normal = gather(simd, &self.triangles[..triangle_count], |&triangle| flat_normal(draw, triangle));
+            steady_light = light(simd, in_view(draw, normal));
+        }
+
+        // Fragments are made in turns but put down in draw order.
+        let mut next = [0; LANES];
+        let mut covered = [0; LANES];
+        let mut primitives = [0; LANES];
+        let mut place = fragments.count;
+        let mut turns = 0;
+        for lane in 0..triangle_count {
+            next[lane] = place;
+            covered[lane] = self.covered[lane];
+            primitives[lane] = draw.first_primitive + self.triangles[lane];
+            let count = covered[lane].count_ones();
+            place += count as usize;
+            turns = turns.max(count);
+        }
+        fragments.make_room(place);
+        let left = i32x16::load_array(simd, self.left);
+        let top = i32x16::load_array(simd, self.top);
+        let (columns, rows) = (TILE_PX - 1, TILE_PX - 1);
+        for _ in 0..turns {
+            let mut bits = [0; LANES];
+            for (bit, covered) in bits.iter_mut().zip(&covered) {
+                *bit = covered.trailing_zeros() as i32;
+            }
+            let bits = i32x16::load_array(simd, bits);
+            let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
+            let tile = (y >> 5) * grid.columns as i32 + (x >> 5);
+            let places = (tile << SAMPLE_BITS) | ((y & rows as i32) << 5) | (x & columns as i32);
+            let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
+            let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
+            // Adding zero turns -0 into 0.
+            let depth = depth.to_f32().max(least).min(greatest) + 0.0;
+            let light = match &normal_planes {
+                None => steady_light,
+                Some([nx, ny, nz]) => light(simd, [at(nx, x, y), at(ny, x, y), at(nz, x, y)]),
+            };
+            let (places, depth, light): ([i32; LANES], [f32; LANES], [f32; LANES]) =
+                (places.into(), depth.into(), light.into());
+            for lane in 0..triangle_count {
+                if covered[lane] == 0 {
+                    continue;
+                }
+                covered[lane] &= covered[lane] - 1;
+                let place = next[lane];
+                next[lane] += 1;
+                fragments.places[place] = places[lane] as u32;
+                fragments.fragments[place] = SmallFragment {
+                    depth: depth[lane],
+                    light: light[lane],
+                    primitive: primitives[lane],
+                    draw: draw_number,
+                };
+            }
+        }
+        fragments.count = place;
+    }
+}
+
+/// A plane for each of sixteen triangles.
+struct WidePlane<S: Simd> {
+    value: Wide<S>,
+    dx: Wide<S>,
+    dy: Wide<S>,
+}
+
+impl<S: Simd> WidePlane<S> {
+    /// Of the weight that an edge's opposite corner has.
+    #[inline(always)]
+    fn weight(
+        simd: S,
+        (from_x, from_y): (i32x16<S>, i32x16<S>),
+        (to_x, to_y): (i32x16<S>, i32x16<S>),
+        (x, y): (i32x16<S>, i32x16<S>),
+        inv_area: Wide<S>,
+    ) -> Self {
+        let (a, b) = (from_y - to_y, to_x - from_x);
+        let step = Wide::splat(simd, f64::from(SUBPIXELS)) * inv_area;
+        Self {
+            value: Wide::from_int(a * (x - from_x) + b * (y - from_y)) * inv_area,
+            dx: Wide::from_small_int(a) * step,
+            dy: Wide::from_small_int(b) * step,
+        }
+    }
+
+    #[inline(always)]
+    fn to_f32(&self) -> [f32x16<S>; 3] {
+        [self.value.to_f32(), self.dx.to_f32(), self.dy.to_f32()]
+    }
+}
+
+/// One axis of a plane of normals: value at the anchor, change to the right, change downwards.
+#[inline(always)]
+fn normal_plane<S: Simd>(
+    a: f32x16<S>,
+    b: f32x16<S>,
+    c: f32x16<S>,
+    [second, third]: &[[f32x16<S>; 3]; 2],
+) -> [f32x16<S>; 3] {
+    let (to_b, to_c) = (b - a, c - a);
+    [a + (to_b * second[0] + to_c * third[0]), to_b * second[1] + to_c * third[1], to_b * second[2] + to_c * third[2]]
+}
+
+#[inline(always)]
+fn at<S: Simd>([value, dx, dy]: &[f32x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+    (*value + *dy * y) + *dx * x
+}
+
+/// The geometric normal of a triangle.
+#[inline(always)]
+fn flat_normal(draw: &Draw<'_>, triangle: u32) -> Vec3 {
+    let [a, b, c] = draw.mesh.triangles()[triangle as usize].map(|vertex| draw.mesh.positions()[vertex as usize]);
+    unit(b - a).cross(unit(c - a))
+}
+
+#[inline(always)]
+fn unit(edge: Vec3) -> Vec3 {
+    edge / edge.abs().max_element().max(f32::MIN_POSITIVE)
+}
+
+/// A vector for each of sixteen lanes, as structure of arrays.
+#[inline(always)]
+fn gather<S: Simd, T>(simd: S, lanes: &[T], vector: impl Fn(&T) -> Vec3) -> [f32x16<S>; 3] {
+    let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for (lane, from) in lanes.iter().enumerate() {
+        [x[lane], y[lane], z[lane]] = vector(from).to_array();
+    }
+    [f32x16::load_array(simd, x), f32x16::load_array(simd, y), f32x16::load_array(simd, z)]
+}
+
+/// Pairs of numbers at one corner of each triangle.
+#[inline(always)]
+fn gather_pairs<S: Simd, V: SimdBase<S>>(simd: S, corners: &[[u32; 3]], k: usize, from: &[[V::Element; 2]]) -> (V, V) {
+    let mut pairs = [[V::Element::default(); 2]; LANES];
+    for (pair, corners) in pairs.iter_mut().zip(corners) {
+        *pair = from[corners[k] as usize];
+    }
+    load_pairs(simd, &pairs)
+}
+
+/// Normals in camera space.
+#[inline(always)]
+fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let matrix = &draw.view_from_normal;
+    [
+        (x * matrix.x_axis.x + y * matrix.y_axis.x) + z * matrix.z_axis.x,
+        (x * matrix.x_axis.y + y * matrix.y_axis.y) + z * matrix.z_axis.y,
+        (x * matrix.x_axis.z + y * matrix.y_axis.z) + z * matrix.z_axis.z,
+    ]
+}
+
+/// Two arrays from one of pairs.
+#[inline(always)]
+pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element; 2]; LANES]) -> (V, V) {
+    let (low, high) = pairs.as_flattened().split_at(LANES);
+    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high))
+}
+
+impl NewFragments {
+    #[inline(always)]
+    fn make_room(&mut self, count: usize) {
+        if self.places.len() < count {
+            let room = count.next_power_of_two().max(1024);
+            self.places.resize(room, 0);
+            self.fragments.resize(room, SmallFragment::default());
+        }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.places.capacity() * 4 + self.fragments.capacity() * size_of::<SmallFragment>()
+    }
+}
+
+impl SmallFragments {
+    /// Takes over what came, sorted by tile, keeping draw order.
+    pub(crate) fn take(&mut self, new: &mut NewFragments, grid: &TileGrid) {
+        self.starts.clear();
+        let count = std::mem::take(&mut new.count);
+        if count == 0 {
+            return;
+        }
+        let (places, fragments) = (&new.places[..count], &new.fragments[..count]);
+        self.starts.resize(grid.tile_count() + 1, 0);
+        for place in places {
+            self.starts[(place >> SAMPLE_BITS) as usize + 1] += 1;
+        }
+        for i in 1..self.starts.len() {
+            self.starts[i] += self.starts[i - 1];
+        }
+        if self.samples.len() < count {
+            // A little more, so that another frame does not need a little more.
+            self.samples.resize(count + count / 16, 0);
+            self.fragments.resize(count + count / 16, SmallFragment::default());
+        }
+        // Each start moves to the next one's place while its fragments are put down ...
+        for (&place, &fragment) in places.iter().zip(fragments) {
+            let start = &mut self.starts[(place >> SAMPLE_BITS) as usize];
+            self.samples[*start as usize] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
+            self.fragments[*start as usize] = fragment;
+            *start += 1;
+        }
+        // ... and back.
+        self.starts.copy_within(0..grid.tile_count(), 1);
+        self.starts[0] = 0;
+    }
+
+    /// The fragments in a tile, in draw order, and their samples.
+    #[inline(always)]
+    pub(crate) fn tile(&self, number: u32) -> (&[SmallFragment], &[u16]) {
+        if self.starts.is_empty() {
+            return (&[], &[]);
+        }
+        let number = number as usize;
+        let range = self.starts[number] as usize..self.starts[number + 1] as usize;
+        (&self.fragments[range.clone()], &self.samples[range])
+    }
+
+    /// Adds how many fragments each tile has.
+    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
+        add_counts(&self.starts, counts);
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.starts.capacity() * 4
+            + self.fragments.capacity() * size_of::<SmallFragment>()
+            + self.samples.capacity() * 2
+    }
+}
+
+/// Adds the lengths of the ranges between `starts`.
+pub(crate) fn add_counts(starts: &[u32], counts: &mut [u32]) {
+    for (count, range) in counts.iter_mut().zip(starts.windows(2)) {
+        *count += range[1] - range[0];
+    }
+}
