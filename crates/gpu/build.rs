@@ -7,6 +7,9 @@
 //! The LFB for other people's shaders, `shaders/lfb`, is linked for each payload: to add fragments, to read them, and with
 //! the pass that sorts.
 
+#[path = "build/networks.rs"]
+mod networks;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +18,7 @@ use std::{env, fs};
 
 use wesl::{CompileOptions, FileResolver, ModulePath, ResolveError, Resolver, Wesl};
 
-/// Takes `package::lfb` for another module; and if that is not a technique, what the renderer's own passes know of frame,
+/// Takes `package::shared::networks` from `build/networks.rs`, and `package::lfb` for another module; and if that is not a technique, what the renderer's own passes know of frame,
 /// picture and fragment for that module too.
 struct LfbResolver {
     files: FileResolver,
@@ -39,6 +42,9 @@ impl LfbResolver {
 
 impl Resolver for LfbResolver {
     fn resolve_source<'a>(&'a self, path: &ModulePath) -> Result<Cow<'a, str>, ResolveError> {
+        if path.components == ["shared", "networks"] {
+            return Ok(networks::module().into());
+        }
         self.files.resolve_source(self.real(path))
     }
 
@@ -53,6 +59,7 @@ impl Resolver for LfbResolver {
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
+    println!("cargo::rerun-if-changed=build");
     let techniques = sources("technique");
     let passes = sources("pass");
     let mut linked = BTreeMap::new();
@@ -72,7 +79,7 @@ fn main() {
                 let random_access = technique_source.contains("fn slot_at(");
                 // What is sorted is a reference to a fragment, where it cannot be moved itself.
                 let by_key = technique_source.contains("fn load_key(");
-                let features = [("random_access", random_access), ("by_key", by_key)];
+                let features = [("random_access", random_access), ("by_key", by_key), ("sorts", can_sort)];
                 let name = format!("{stem}_{technique}").to_uppercase();
                 linked.insert(name, compile(&path("pass", stem), Some(path("technique", technique)), &features));
             }

@@ -11,6 +11,9 @@ use crate::steps::Steps;
 use crate::surface::Surfaces;
 use crate::{Context, GpuError};
 
+/// Format of [`Targets::picture`].
+pub(crate) const PICTURE_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
+
 /// Textures of the picture's size, kept between frames.
 #[derive(Debug)]
 pub(crate) struct Targets {
@@ -44,7 +47,7 @@ impl Targets {
         let attachment = TextureUsages::RENDER_ATTACHMENT;
         let opaque_color = texture("the opaque surfaces", TextureFormat::Rgba16Float, attachment)?;
         let opaque_depth = texture("the opaque depth", TextureFormat::Depth32Float, attachment)?;
-        let picture = texture("the picture", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING)?;
+        let picture = texture("the picture", PICTURE_FORMAT, TextureUsages::STORAGE_BINDING | attachment)?;
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         Ok(Self {
             width,
@@ -93,7 +96,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) fbuffer_size: Option<Size>,
     /// Windows of slots so far.
     pub(crate) slot_windows: u64,
-    frame_data: wgpu::Buffer,
+    pub(crate) frame_data: wgpu::Buffer,
     encoder: Option<wgpu::CommandEncoder>,
 }
 
@@ -191,15 +194,43 @@ impl<'a> Frame<'a> {
         color_attachments: &[Option<wgpu::RenderPassColorAttachment<'_>>],
         (view, depth_ops): (&TextureView, Option<wgpu::Operations<f32>>),
     ) -> Result<wgpu::RenderPass<'static>, GpuError> {
+        let depth = wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None };
+        let mut pass = self.begin_render_pass(step, window, color_attachments, Some(depth))?;
+        // As large as can be around the picture, so that no triangle has to be clipped at its sides: llvmpipe does that, and
+        // the new corners it snaps to the grid move the edges between them.
+        let side = self.viewport();
+        let start = |pixels: u32| (pixels as f32 - side) / 2.0;
+        pass.set_viewport(start(self.view.width), start(self.view.height), side, side, 0.0, 1.0);
+        Ok(pass)
+    }
+
+    /// Begins a render pass of a step into a window of the picture, over what is there.
+    pub(crate) fn picture_pass(
+        &mut self,
+        step: &'static str,
+        window: Window,
+    ) -> Result<wgpu::RenderPass<'static>, GpuError> {
+        let color = wgpu::RenderPassColorAttachment {
+            view: &self.targets.picture_view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+        };
+        self.begin_render_pass(step, window, &[Some(color)], None)
+    }
+
+    fn begin_render_pass(
+        &mut self,
+        step: &'static str,
+        window: Window,
+        color_attachments: &[Option<wgpu::RenderPassColorAttachment<'_>>],
+        depth_stencil_attachment: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
+    ) -> Result<wgpu::RenderPass<'static>, GpuError> {
         let stamps = self.begin_step(step)?;
         let descriptor = wgpu::RenderPassDescriptor {
             label: Some(step),
             color_attachments,
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view,
-                depth_ops,
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment,
             timestamp_writes: stamps.as_ref().map(|(query_set, begin, end)| wgpu::RenderPassTimestampWrites {
                 query_set,
                 beginning_of_pass_write_index: Some(*begin),
@@ -209,11 +240,6 @@ impl<'a> Frame<'a> {
             multiview_mask: None,
         };
         let mut pass = self.encoder().begin_render_pass(&descriptor).forget_lifetime();
-        // As large as can be around the picture, so that no triangle has to be clipped at its sides: llvmpipe does that, and
-        // the new corners it snaps to the grid move the edges between them.
-        let side = self.viewport();
-        let start = |pixels: u32| (pixels as f32 - side) / 2.0;
-        pass.set_viewport(start(self.view.width), start(self.view.height), side, side, 0.0, 1.0);
         pass.set_scissor_rect(window.left, window.top, window.width, window.height);
         Ok(pass)
     }

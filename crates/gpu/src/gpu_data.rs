@@ -98,10 +98,12 @@ pub struct DrawData {
     pub flags: u32,
     /// How its texture is sampled, in bits.
     pub sampling: u32,
+    /// Width and height of its texture in texels.
+    pub texture_size: [u32; 2],
     /// Number of the instance.
     pub number: u32,
     /// Ends on a multiple of 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: u32,
 }
 
 /// Bits of [`DrawData::flags`], as in `shaders/shared/mesh.wesl`.
@@ -161,8 +163,11 @@ impl DrawData {
             colors: places.colors,
             flags,
             sampling,
+            texture_size: draw
+                .texture
+                .map_or([0; 2], |(texture, _)| [texture.levels()[0].width, texture.levels()[0].height]),
             number,
-            padding: [0; 3],
+            padding: 0,
         }
     }
 }

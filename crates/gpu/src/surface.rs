@@ -106,27 +106,21 @@ impl SurfaceLayouts {
             };
             wgpu::BindGroupLayoutEntry { binding, visibility: all, ty, count: None }
         };
-        let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
+        let texture = |binding, sample_type, view_dimension| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: ShaderStages::FRAGMENT | ShaderStages::COMPUTE,
-            ty: BindingType::Texture {
-                sample_type,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
+            ty: BindingType::Texture { sample_type, view_dimension, multisampled: false },
             count: None,
         };
+        let depth = texture(2, wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
         let layout = |label, entries: &[_]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
-        let frame = layout(
-            "frame and draw",
-            &[uniform(0), uniform(1), texture(2, wgpu::TextureSampleType::Depth), storage_entry(3, all, true)],
-        );
+        let frame = layout("frame and draw", &[uniform(0), uniform(1), depth, storage_entry(3, all, true)]);
         let unshaded = ShaderStages::VERTEX | ShaderStages::COMPUTE;
         let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, unshaded, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
-        let texture_layout = layout("texture", &[texture(0, texels), texture(1, texels)]);
+        let texture_layout = layout("texture", &[texture(0, texels, wgpu::TextureViewDimension::D2Array)]);
         let one_texel = |format| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("none"),
@@ -141,7 +135,7 @@ impl SurfaceLayouts {
         };
         let no_depth = one_texel(wgpu::TextureFormat::Depth32Float).create_view(&Default::default());
         let no_texels = one_texel(wgpu::TextureFormat::Rgba8UnormSrgb);
-        let no_texture = texture_group(device, &texture_layout, &[no_texels.clone(), no_texels]);
+        let no_texture = texture_group(device, &texture_layout, &no_texels);
         Self {
             frame,
             scene,
@@ -152,20 +146,20 @@ impl SurfaceLayouts {
         }
     }
 
-    pub(crate) fn texture_bind_group(&self, gpu: &Context, textures: &[wgpu::Texture; 2]) -> BindGroup {
-        texture_group(&gpu.device, &self.texture, textures)
+    pub(crate) fn texture_bind_group(&self, gpu: &Context, texture: &wgpu::Texture) -> BindGroup {
+        texture_group(&gpu.device, &self.texture, texture)
     }
 }
 
-fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, textures: &[wgpu::Texture; 2]) -> BindGroup {
-    let views = textures.each_ref().map(|texture| texture.create_view(&Default::default()));
+fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, texture: &wgpu::Texture) -> BindGroup {
+    let view = texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    });
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("texture"),
         layout,
-        entries: &[0, 1].map(|binding: u32| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(&views[binding as usize]),
-        }),
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) }],
     })
 }
 

@@ -116,18 +116,18 @@ fn upload<T: bytemuck::Pod>(
     Ok(buffer)
 }
 
-/// The full size, and all smaller levels one under the other; see `shaders/shared/texture.wesl`.
-fn upload_texture(gpu: &Context, texture: &Texture) -> Result<[wgpu::Texture; 2], GpuError> {
+/// The full size as the first layer, and all smaller levels one under the other as the second; see
+/// `shaders/shared/texture.wesl`.
+fn upload_texture(gpu: &Context, texture: &Texture) -> Result<wgpu::Texture, GpuError> {
     let (full_size, smaller) = texture.levels().split_at(1);
-    Ok([upload_levels(gpu, full_size)?, upload_levels(gpu, smaller)?])
-}
-
-fn upload_levels(gpu: &Context, levels: &[MipLevel]) -> Result<wgpu::Texture, GpuError> {
-    let width = levels.iter().map(|level| level.width).max().unwrap_or(1);
-    let height = levels.iter().map(|level| level.height).sum::<u32>().max(1);
+    let height = |levels: &[MipLevel]| levels.iter().map(|level| level.height).sum::<u32>();
     let uploaded = gpu.texture(&wgpu::TextureDescriptor {
         label: Some("a texture of the scene"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        size: wgpu::Extent3d {
+            width: full_size[0].width,
+            height: height(full_size).max(height(smaller)),
+            depth_or_array_layers: if smaller.is_empty() { 1 } else { 2 },
+        },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
@@ -135,20 +135,22 @@ fn upload_levels(gpu: &Context, levels: &[MipLevel]) -> Result<wgpu::Texture, Gp
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
     })?;
-    let mut top = 0;
-    for level in levels {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: &uploaded,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: top, z: 0 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            level.texels.as_flattened(),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
-            wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
-        );
-        top += level.height;
+    for (layer, levels) in (0..).zip([full_size, smaller]) {
+        let mut top = 0;
+        for level in levels {
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &uploaded,
+                    mip_level: 0,
+                    origin: wgpu::Origin3d { x: 0, y: top, z: layer },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                level.texels.as_flattened(),
+                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
+                wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
+            );
+            top += level.height;
+        }
     }
     Ok(uploaded)
 }

@@ -125,8 +125,8 @@ fn a_repaired_capture_holds_what_its_formula_says() {
     for (technique, storage, gpu) in subjects() {
         let stats = gpu.render(&scene, &view, Resolve::Blend, technique).unwrap().stats;
         let greatest = u64::from(stats.max_depth_complexity);
-        // Four classes of runs of 64 pixels, with their numbers and dispatches.
-        let lists = 4 * (pixels.div_ceil(64) * 4 + 4 + 12);
+        // Five classes of runs of 64 pixels, with their numbers and dispatches.
+        let lists = 5 * (pixels.div_ceil(64) * 4 + 4 + 12);
         let bytes = match (technique, storage) {
             (Technique::List, _) => 8 * pixels + 4 + 20 * stats.fragments,
             (Technique::Pages, _) => {

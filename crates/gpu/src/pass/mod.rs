@@ -5,3 +5,4 @@ pub(crate) mod opaque;
 pub(crate) mod ordered;
 pub(crate) mod picture;
 pub(crate) mod prefix_sum;
+pub(crate) mod whole_window;

@@ -1,31 +1,39 @@
 //! From a captured LFB to ordered fragments to the picture, the same for every technique that is an LFB. Twins:
 //! `shaders/pass/{classify,sort,resolve}.wesl`, linked with the technique's own module.
 //!
-//! Step "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs, and finishes those
-//! without any. Each class has shaders of its own, dispatched over its list. On the way to the resolve, in "read and blend",
-//! up to 8 fragments are sorted in registers, up to 32 by insertion in a local array, and references to up to 64 by heap
-//! sort in a local array; more are sorted in place before, in "sort", in O(n log n) and no memory but the capture's own.
-//! The array of references is no longer as llvmpipe takes 8 s to compile one of 256, and 0.8 s for 64. With `presort` all are
-//! sorted in place; of a technique whose fragments come in order, none.
+//! Step "empty pixels" draws what pixels without any become, over the whole window. Step "classify" lists runs of 64 pixels
+//! by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
+//! the way to the resolve, in "read and blend", up to 8, 16 or 32 fragments are sorted in registers by networks
+//! (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
+//! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n) and no memory but
+//! the capture's own. With `presort` all are sorted in place; of a technique whose fragments come in order, none.
+//!
+//! Rejected: insertion sort in a local array up to 32 fragments, which the LFB chapter (section 20.4.1) found the fastest,
+//! and heap sort of references above. Local arrays are memory to many compilers, networks are not, and llvmpipe took
+//! seconds to compile arrays of a hundred references.
 
 use std::collections::HashMap;
 
 use pellucid_core::Resolve;
-use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, RenderPipeline, ShaderModule, ShaderStages};
 
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
 use crate::pass::gather::Gather;
 use crate::pass::picture::GROUP_PX;
+use crate::pass::whole_window::WholeWindow;
 use crate::surface::{shader, storage_entry};
-use crate::{Context, GpuError};
+use crate::{Context, GpuError, shaders};
 
 /// Classes of runs, and pixels of a run. Twins in `shaders/shared/classes.wesl`.
-const CLASSES: u64 = 4;
+const CLASSES: u64 = 5;
 const RUN_PX: u64 = 64;
 
 /// Workgroups in a row of a dispatch. Twin in `shaders/shared/classes.wesl`.
 const GRID_WIDTH: u64 = 32_768;
+
+/// Runs that a workgroup classifies.
+const GROUP_RUNS: u64 = 64;
 
 /// Bytes of an indirect dispatch.
 const DISPATCH_BYTES: u64 = 12;
@@ -53,9 +61,11 @@ pub(crate) struct OrderedPasses {
     classify_module: ShaderModule,
     resolve_module: ShaderModule,
     layouts: [BindGroupLayout; 2],
-    /// One for each entry point and resolve that was asked for, and one for each classification.
+    empty: WholeWindow,
+    /// One for each resolve that was asked for, one for each entry point and resolve, and one for each classification.
+    empties: HashMap<u32, RenderPipeline>,
     resolves: HashMap<(&'static str, u32), ComputePipeline>,
-    classifies: HashMap<(bool, u32), ComputePipeline>,
+    classifies: HashMap<bool, ComputePipeline>,
     gather: Gather,
 }
 
@@ -63,7 +73,7 @@ impl OrderedPasses {
     /// `picture_layout` is group 0, `lfb_layout` group 3.
     pub(crate) fn new(
         gpu: &Context,
-        shaders: LfbShaders,
+        lfb: LfbShaders,
         picture_layout: &BindGroupLayout,
         lfb_layout: &BindGroupLayout,
     ) -> Self {
@@ -73,19 +83,19 @@ impl OrderedPasses {
         });
         let layouts = [Some(picture_layout), Some(&buffer), None, Some(lfb_layout)];
         let prepare_layouts = [Some(picture_layout), Some(&buffer), Some(&buffer), Some(lfb_layout)];
-        let classify_module = shader(gpu, "classify", shaders.classify);
+        let classify_module = shader(gpu, "classify", lfb.classify);
         Self {
             prepare: compute_pipeline(gpu, "classify", &classify_module, "prepare", &prepare_layouts, &[]),
-            sort: shaders
-                .sort
-                .map(|wgsl| compute_pipeline(gpu, "sort", &shader(gpu, "sort", wgsl), "main", &layouts, &[])),
+            sort: lfb.sort.map(|wgsl| compute_pipeline(gpu, "sort", &shader(gpu, "sort", wgsl), "main", &layouts, &[])),
             classify_module,
-            resolve_module: shader(gpu, "read and blend", shaders.resolve),
+            resolve_module: shader(gpu, "read and blend", lfb.resolve),
             layouts: [picture_layout.clone(), lfb_layout.clone()],
             buffer,
+            empty: WholeWindow::new(gpu, "empty pixels", shaders::EMPTY, None),
+            empties: HashMap::new(),
             resolves: HashMap::new(),
             classifies: HashMap::new(),
-            gather: Gather::new(gpu, shaders.gather, picture_layout, lfb_layout),
+            gather: Gather::new(gpu, lfb.gather, picture_layout, lfb_layout),
         }
     }
 
@@ -116,19 +126,21 @@ impl OrderedPasses {
         let (classes, prepared) = (bind_group(&runs), bind_group(&dispatches));
         let groups = [&frame.picture.bind_group.clone(), &classes, lfb];
 
+        let empty = self.empties.entry(code).or_insert_with(|| self.empty.pipeline(gpu, &[("resolve", code.into())]));
+        self.empty.record(frame, window, empty, None)?;
         frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
         let mut pass = frame.compute_pass("classify")?;
         set_groups(&mut pass, groups);
-        pass.set_pipeline(self.classify(gpu, one_class, code));
-        let all_runs = window.pixels().div_ceil(RUN_PX);
-        pass.dispatch_workgroups(all_runs.min(GRID_WIDTH) as u32, all_runs.div_ceil(GRID_WIDTH) as u32, 1);
+        pass.set_pipeline(self.classify(gpu, one_class));
+        let workgroups = window.pixels().div_ceil(RUN_PX * GROUP_RUNS);
+        pass.dispatch_workgroups(workgroups.min(GRID_WIDTH) as u32, workgroups.div_ceil(GRID_WIDTH) as u32, 1);
         pass.set_pipeline(&self.prepare);
         pass.set_bind_group(2, &prepared, &[]);
         pass.dispatch_workgroups(1, 1, 1);
         drop(pass);
 
         let class = |number: u64| number * DISPATCH_BYTES;
-        let [few, some, more, many] = [0, 1, 2, 3].map(class);
+        let [few, some, more, blocks, many] = [0, 1, 2, 3, 4].map(class);
         if let Some(sort) = self.sort.as_ref().filter(|_| needs_order) {
             let mut pass = frame.compute_pass("sort")?;
             set_groups(&mut pass, groups);
@@ -140,7 +152,7 @@ impl OrderedPasses {
         let entries: &[(&'static str, u64)] = match (needs_order, sorts_all) {
             (false, _) => &[("unordered", many)],
             (true, true) => &[("in_order", many)],
-            (true, false) => &[("few", few), ("some", some), ("more", more), ("in_order", many)],
+            (true, false) => &[("few", few), ("some", some), ("more", more), ("blocks", blocks), ("in_order", many)],
         };
         for &(entry, dispatch) in entries {
             pass.set_pipeline(self.resolve(gpu, entry, code));
@@ -153,11 +165,11 @@ impl OrderedPasses {
         Ok(())
     }
 
-    fn classify(&mut self, gpu: &Context, one_class: bool, code: u32) -> &ComputePipeline {
+    fn classify(&mut self, gpu: &Context, one_class: bool) -> &ComputePipeline {
         let [picture, lfb] = &self.layouts;
         let layouts = [Some(picture), Some(&self.buffer), None, Some(lfb)];
-        self.classifies.entry((one_class, code)).or_insert_with(|| {
-            let constants = [("one_class", f64::from(u8::from(one_class))), ("resolve", f64::from(code))];
+        self.classifies.entry(one_class).or_insert_with(|| {
+            let constants = [("one_class", f64::from(u8::from(one_class)))];
             compute_pipeline(gpu, "classify", &self.classify_module, "main", &layouts, &constants)
         })
     }

@@ -5,13 +5,13 @@
 
 use pellucid_core::Resolve;
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, ComputePipeline, ShaderStages};
+use wgpu::{BindGroupLayout, RenderPipeline, ShaderStages};
 
 use super::{Capture, Layouts, Outcome};
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
-use crate::pass::ordered::{compute_pipeline, dispatch_window};
-use crate::surface::{SurfacePass, SurfacePipelines, depth_state, shader};
+use crate::pass::whole_window::WholeWindow;
+use crate::surface::{SurfacePass, SurfacePipelines, depth_state};
 use crate::{Context, GpuError, shaders};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -21,7 +21,8 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 pub(crate) struct Alpha {
     blend: SurfacePipelines,
     layout: BindGroupLayout,
-    compose: ComputePipeline,
+    compose: WholeWindow,
+    compose_pipeline: RenderPipeline,
     blended: Option<wgpu::Texture>,
 }
 
@@ -50,7 +51,7 @@ impl Alpha {
             label: Some("alpha"),
             entries: &[wgpu::BindGroupLayoutEntry {
                 binding: 0,
-                visibility: ShaderStages::COMPUTE,
+                visibility: ShaderStages::FRAGMENT,
                 ty: wgpu::BindingType::Texture {
                     sample_type: wgpu::TextureSampleType::Float { filterable: false },
                     view_dimension: wgpu::TextureViewDimension::D2,
@@ -59,10 +60,9 @@ impl Alpha {
                 count: None,
             }],
         });
-        let module = shader(gpu, "compose", shaders::COMPOSE);
-        let group_layouts = [Some(layouts.picture), None, None, Some(&layout)];
-        let compose = compute_pipeline(gpu, "compose", &module, "main", &group_layouts, &[]);
-        Self { blend, layout, compose, blended: None }
+        let compose = WholeWindow::new(gpu, "compose", shaders::COMPOSE, Some(&layout));
+        let compose_pipeline = compose.pipeline(gpu, &[]);
+        Self { blend, layout, compose, compose_pipeline, blended: None }
     }
 
     /// The texture that layers are blended into: kept while the picture's size stays the same.
@@ -106,9 +106,7 @@ impl Capture for Alpha {
             layout: &self.layout,
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) }],
         });
-        let mut pass = frame.compute_pass("compose")?;
-        pass.set_pipeline(&self.compose);
-        dispatch_window(&mut pass, frame, window, &group);
+        self.compose.record(frame, window, &self.compose_pipeline, Some(&group))?;
         Ok(Outcome::Done)
     }
 }
