@@ -204,7 +204,7 @@ impl Memory {
     /// The storage buffer of this name: the one there is if it is large enough, not twice too large, and leaves room for
     /// the others; else a new one of exactly `bytes`. Its content is undefined.
     pub(crate) fn buffer(&mut self, gpu: &Context, name: &'static str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
-        let bytes = bytes.max(16).next_multiple_of(4);
+        let bytes = allocated(bytes);
         if let Some(buffer) = self.buffers.get(name) {
             if (bytes..=2 * bytes).contains(&buffer.size()) {
                 return Ok(buffer.clone());
@@ -263,12 +263,12 @@ impl Memory {
     /// Gives back buffers that are larger than these need to be, so that all of them fit the budget together. Techniques
     /// call it with everything a window needs, before they ask for any of it. Returns whether everything was given back.
     pub(crate) fn make_room(&mut self, needs: &[(&'static str, u64)]) -> bool {
-        let need = |name| needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
+        let need = |name| needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| allocated(bytes));
         let is_held = |name| self.held().any(|(held, _)| held == name);
         let total: u64 = self
             .held()
             .map(|(name, bytes)| bytes.max(need(name)))
-            .chain(needs.iter().filter(|&&(name, _)| !is_held(name)).map(|&(_, bytes)| bytes))
+            .chain(needs.iter().filter(|&&(name, _)| !is_held(name)).map(|&(_, bytes)| allocated(bytes)))
             .sum();
         let is_too_much = total > self.budget_bytes;
         if is_too_much {
@@ -285,7 +285,12 @@ fn texture_bytes(texture: &wgpu::Texture) -> u64 {
 }
 
 fn total(needs: &[(&'static str, u64)]) -> u64 {
-    needs.iter().map(|&(_, bytes)| bytes.max(16)).sum()
+    needs.iter().map(|&(_, bytes)| allocated(bytes)).sum()
+}
+
+/// Bytes of a buffer that has to hold so many.
+fn allocated(bytes: u64) -> u64 {
+    bytes.max(16).next_multiple_of(4)
 }
 
 #[cfg(test)]
