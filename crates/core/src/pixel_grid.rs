@@ -293,6 +293,12 @@ mod tests {
     }
 
     #[test]
+    fn a_depth_just_below_zero_is_zero_and_not_minus_zero() {
+        let plane = Plane { value: -1e-60, dx: 0.0, dy: 0.0 };
+        assert_eq!(depth_at(&plane, [0.0, 1.0], 0, 0).to_bits(), 0, "its bits would lie in front of everything");
+    }
+
+    #[test]
     fn a_pixel_square_owns_its_top_left_corner_only() {
         // Corners on pixel centres: of the four centres on its outline only the top left one is covered.
         let (low, high) = (center(1), center(2));

@@ -18,7 +18,7 @@ pub(crate) fn module() -> String {
 @if(sorts && !by_key) import package::lfb::{load as load_key, store as store_key};
 @if(sorts && by_key) import package::lfb::{load_key, store_key};
 import package::shared::fragment::{is_in_front, stored_color};
-import package::shared::resolve::{ResolveState, resolve_add};
+import package::shared::resolve::{ResolveState, resolve_add_numbered};
 
 const PLUS_ONE = vec4(0u, 0u, 1u, 0u);
 
@@ -49,7 +49,9 @@ fn write_resolve(text: &mut String, size: usize) -> std::fmt::Result {
     for i in 0..size {
         writeln!(
             text,
-            "    if {i}u < count {{ resolve_add(resolve, state, stored_color(f{i}), bitcast<f32>(f{i}.z - 1u)); }}"
+            "    if {i}u < count {{
+        resolve_add_numbered(resolve, state, {i}u, stored_color(f{i}), bitcast<f32>(f{i}.z - 1u));
+    }}"
         )?;
     }
     writeln!(text, "}}")
