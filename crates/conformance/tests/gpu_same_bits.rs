@@ -19,11 +19,13 @@ fn everything(renderer: &Renderer, scene: &Scene, view: &View) -> (Layers, Vec<I
 
 #[test]
 fn every_structure_gives_the_same_bits() {
-    for case in CASES {
-        let prepared = case.prepare().unwrap();
-        for floor in [false, true] {
-            let Some(device) = gpu(floor) else { return };
-            let mut renderer = Renderer::new().gpu(device).technique(Technique::Linear);
+    for floor in [false, true] {
+        // One device for all cases, as most of the time goes into compiling shaders.
+        let Some(device) = gpu(floor) else { return };
+        let mut renderer = Renderer::new().gpu(device);
+        for case in CASES {
+            let prepared = case.prepare().unwrap();
+            renderer = renderer.technique(Technique::Linear);
             let expected = everything(&renderer, &prepared.scene, &prepared.view);
             for technique in [Technique::List, Technique::ABuffer, Technique::Pages] {
                 renderer = renderer.technique(technique);
