@@ -85,6 +85,15 @@ fn main() {
             }
         }
     }
+    for stem in ["setup", "bin", "scatter", "dispatch", "sort"] {
+        linked.insert(format!("LUCID_{}", stem.to_uppercase()), link("technique::lucid", stem));
+    }
+    // Those that shade know all draws at once, and only read what was set up.
+    for stem in ["raster", "repair", "layers"] {
+        let features = [("all_draws", true), ("read_only", true)];
+        let linked_text = compile(&path("technique::lucid", stem), None, &features);
+        linked.insert(format!("LUCID_{}", stem.to_uppercase()), linked_text);
+    }
     for stem in ["raster", "shade", "collect", "sort", "output", "last"] {
         linked.insert(format!("FBUFFER_{}", stem.to_uppercase()), link("fbuffer", stem));
     }

@@ -1,0 +1,421 @@
+//! LucidRaster (Jakubowski 2025): a rasterizer in compute shaders, made for transparent surfaces, and exact. Twins:
+//! `shaders/technique/lucid`.
+//!
+//! By stage, each a file here and there:
+//!
+//! - `quads`: at load time triangles are paired, so that set-up transforms shared vertices once.
+//! - `setup`: one invocation a quad culls, transforms and snaps it to the pixel grid, and finds what small triangles cover of
+//!   their blocks of 8 x 8 pixels, in integers. What has to be clipped is listed for the host, as it takes f64 (`record`).
+//! - `bin`: large triangles find their bins of 32 x 32 pixels, shared out evenly over invocations, and in those their blocks.
+//!   Then every block's parts of triangles are listed, behind each other.
+//! - `raster`: parts of a block are sorted by depth (in workgroup memory, in `low`; blocks with many by runs that are merged,
+//!   `sort` and `high`), shaded sample by sample, and blended pixel by pixel through a small filter by depth.
+//! - `repair`: pixels that left the filter out of order are rendered again by sweeps that take the next nearest.
+//! - `layers`: the ordered layers themselves, sorted pixel by pixel.
+//!
+//! What differs from the paper, and why:
+//!
+//! - Small triangles, which most are, go to blocks at set-up, not to bins and from there to blocks: one of few samples would
+//!   be read and rasterized twice to find one block.
+//! - Each block is a workgroup of its own, not each bin: lists of parts stand in global memory, sized by what is counted, so
+//!   that there is no limit to triangles in a block and 16 KiB of workgroup memory are enough.
+//! - Coverage is exact, and so is the order: pixels for which the filter was too small are found and mended, and equal depths
+//!   follow draw order. The depths that blocks are sorted by only decide how many have to be.
+//! - All buffers are as large as counters say; a window that overflows is repeated or split.
+
+mod bin;
+mod layers;
+mod quads;
+mod raster;
+mod record;
+mod repair;
+mod setup;
+mod work;
+
+use std::collections::HashMap;
+
+use pellucid_core::Scene;
+use wgpu::{BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages};
+
+use self::work::{BLOCK_PARTS, Counts, DISPATCHES, DRAWS, Header, LISTS, PARTS, PLACES, RECORDS, WORK};
+use super::growth::most_that_fits;
+use super::{Capture, Layouts, Outcome};
+use crate::frame::{Frame, Goal};
+use crate::memory::Window;
+use crate::pass::ordered::compute_pipeline;
+use crate::pass::prefix_sum::PrefixSum;
+use crate::readback::read_buffer;
+use crate::surface::{shader, storage_entry};
+use crate::upload::SceneUpload;
+use crate::{Context, GpuError, shaders};
+
+/// How the rasterizer in compute blends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthFilter {
+    /// Fragments of a pixel that wait for nearer ones, from 1 to 12.
+    pub size: u32,
+    /// Share of light, from 0 to 1: a block is left when less gets through at all its pixels. The picture is exact at 0 alone.
+    pub threshold: f32,
+}
+
+impl DepthFilter {
+    /// Fragments that can wait at most. Twin: `GREATEST_SIZE` in `shaders/technique/lucid/filter.wesl`.
+    pub const GREATEST_SIZE: u32 = 12;
+}
+
+impl Default for DepthFilter {
+    fn default() -> Self {
+        Self { size: 3, threshold: 0.0 }
+    }
+}
+
+/// Windows to remember; more are those of pictures of other sizes.
+const MOST_LEARNED: usize = 4096;
+
+/// What a window took last.
+#[derive(Debug, Clone, Copy)]
+struct Learned {
+    counts: Counts,
+    /// It did not fit, so there may be more than was counted.
+    was_split: bool,
+}
+
+/// Long-lived half.
+#[derive(Debug)]
+pub(crate) struct Lucid {
+    layouts: OwnLayouts,
+    setup: setup::Setup,
+    bin: bin::Bin,
+    raster: raster::Raster,
+    repair: repair::Repair,
+    layers: layers::GatherLayers,
+    prefix_sum: PrefixSum,
+    prepare: ComputePipeline,
+    tally: ComputePipeline,
+    scene: Option<LoadedScene>,
+    learned: HashMap<Window, Learned>,
+}
+
+/// Bind group layouts that stages share. Group 3 of each is the buffers it works on, by the numbers of their bindings.
+#[derive(Debug)]
+struct OwnLayouts {
+    /// Group 0: frame, opaque surfaces and picture, without the figures.
+    picture: BindGroupLayout,
+    /// Group 1: the scene with all draws.
+    scene: BindGroupLayout,
+    dispatches: BindGroupLayout,
+    work: BindGroupLayout,
+}
+
+/// What is made of a scene when it is loaded.
+#[derive(Debug)]
+struct LoadedScene {
+    revision: u64,
+    /// Of each mesh.
+    quads: Vec<setup::MeshQuads>,
+    atlas: wgpu::TextureView,
+}
+
+impl LoadedScene {
+    fn lone_share(&self) -> f64 {
+        let sum = |of: fn(&setup::MeshQuads) -> usize| self.quads.iter().map(of).sum::<usize>();
+        sum(|quads| quads.lone) as f64 / sum(|quads| quads.count).max(1) as f64
+    }
+}
+
+/// Buffers of a window.
+struct Buffers {
+    work: wgpu::Buffer,
+    records: wgpu::Buffer,
+    parts: wgpu::Buffer,
+    places: wgpu::Buffer,
+    block_parts: wgpu::Buffer,
+    lists: wgpu::Buffer,
+    dispatches: wgpu::Buffer,
+}
+
+/// What stages record with.
+struct Stage<'a> {
+    window: Window,
+    buffers: &'a Buffers,
+    picture: BindGroup,
+    scene: BindGroup,
+    /// Whether the colour of any transparent surface varies.
+    varies: bool,
+}
+
+impl Lucid {
+    pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
+        let compute = ShaderStages::COMPUTE;
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None };
+        let texture = |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        let uniform = BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let stored = BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::WriteOnly,
+            format: wgpu::TextureFormat::Rgba32Float,
+            view_dimension: wgpu::TextureViewDimension::D2,
+        };
+        let layout = |label, entries: &[_]| {
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let (flat, pages) = (wgpu::TextureViewDimension::D2, wgpu::TextureViewDimension::D2Array);
+        let texels = wgpu::TextureSampleType::Float { filterable: false };
+        let own = OwnLayouts {
+            picture: layout(
+                "picture",
+                &[
+                    entry(0, uniform),
+                    entry(1, texture(texels, flat)),
+                    entry(2, texture(wgpu::TextureSampleType::Depth, flat)),
+                    entry(3, stored),
+                ],
+            ),
+            scene: layout(
+                "scene and draws",
+                &[
+                    storage_entry(0, compute, true),
+                    storage_entry(1, compute, true),
+                    storage_entry(2, compute, true),
+                    storage_entry(3, compute, true),
+                    entry(4, texture(texels, pages)),
+                ],
+            ),
+            dispatches: layout("dispatches", &[storage_entry(0, compute, false)]),
+            work: buffers_layout(gpu, &[(0, false)]),
+        };
+        let module = shader(gpu, "dispatches", shaders::LUCID_DISPATCH);
+        let groups = [Some(layouts.picture), None, Some(&own.dispatches), Some(&own.work)];
+        let pipeline = |entry| compute_pipeline(gpu, "dispatches", &module, entry, &groups, &[]);
+        Self {
+            setup: setup::Setup::new(gpu, layouts.surfaces),
+            bin: bin::Bin::new(gpu, &own),
+            raster: raster::Raster::new(gpu, &own),
+            repair: repair::Repair::new(gpu),
+            layers: layers::GatherLayers::new(gpu),
+            prefix_sum: PrefixSum::new(gpu),
+            prepare: pipeline("prepare"),
+            tally: pipeline("tally"),
+            layouts: own,
+            scene: None,
+            learned: HashMap::new(),
+        }
+    }
+
+    /// How much a window is likely to take; split windows as much as their parts.
+    fn need(&self, window: Window) -> Option<Counts> {
+        let learned = self.learned.get(&window)?;
+        if !learned.was_split {
+            return Some(learned.counts);
+        }
+        let [a, b] = window.halves()?.map(|half| self.need(half));
+        Some(a?.plus(&b?))
+    }
+
+    fn learn(&mut self, window: Window, counts: Counts, was_split: bool) {
+        if self.learned.len() >= MOST_LEARNED {
+            self.learned.clear();
+        }
+        self.learned.insert(window, Learned { counts, was_split });
+    }
+
+    fn split(&mut self, frame: &Frame<'_>, window: Window, counts: Counts) -> Result<Outcome, GpuError> {
+        self.learn(window, counts, true);
+        let draws = frame.surfaces.data.len() as u64;
+        frame.memory.halves(frame.gpu, window, &work::needs(&counts, window, draws))
+    }
+
+    /// Draws a window, unless there is too little room; says how much was needed.
+    fn run(&mut self, frame: &mut Frame<'_>, window: Window, room: &Counts) -> Result<Counts, GpuError> {
+        let gpu = frame.gpu;
+        let needs = work::needs(room, window, frame.surfaces.data.len() as u64);
+        frame.memory.make_room(&needs);
+        let mut buffer = |name| {
+            let bytes = needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
+            frame.memory.buffer(gpu, name, bytes)
+        };
+        let buffers = Buffers {
+            work: buffer(WORK)?,
+            records: buffer(RECORDS)?,
+            parts: buffer(PARTS)?,
+            places: buffer(PLACES)?,
+            block_parts: buffer(BLOCK_PARTS)?,
+            lists: buffer(LISTS)?,
+            dispatches: buffer(DISPATCHES)?,
+        };
+        let draws = buffer(DRAWS)?;
+        frame.submit()?;
+        gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room, window)));
+        gpu.queue.write_buffer(&draws, 0, bytemuck::cast_slice(&frame.surfaces.data));
+        let stage = Stage {
+            window,
+            picture: self.picture_group(frame),
+            scene: self.scene_group(frame, &draws),
+            varies: frame.surfaces.compute_draws().any(|draw| draw.varies),
+            buffers: &buffers,
+        };
+
+        frame.zero("zero", &buffers.block_parts, buffers.block_parts.size())?;
+        let Some(scene) = &self.scene else { unreachable!("it was loaded") };
+        self.setup.record(frame, &stage, &scene.quads)?;
+        if room.clipped > 0 {
+            let header: Header = read_buffer(frame, &buffers.work, 0, 1)?[0];
+            if !header.counts.fits(room) || !setup::clip(frame, &stage, &header)? {
+                let more = header.counts.clipped.saturating_mul(16);
+                let counts = header.counts;
+                return Ok(Counts {
+                    records: counts.records.saturating_add(more),
+                    large: counts.large.saturating_add(more),
+                    ..counts
+                });
+            }
+        }
+        self.dispatches(frame, &stage, "bins")?;
+        self.bin.find_bins(frame, &stage)?;
+        self.dispatches(frame, &stage, "bins")?;
+        self.bin.cover_blocks(frame, &stage)?;
+        self.prefix_sum.record(frame, "prefix sums", &buffers.block_parts, work::blocks(window) + 1)?;
+        self.dispatches(frame, &stage, "lists")?;
+        self.bin.list_parts(frame, &stage)?;
+        self.dispatches(frame, &stage, "sort")?;
+        self.raster.record(frame, &stage, &self.layouts)?;
+        self.dispatches(frame, &stage, "repair")?;
+        self.repair.record(frame, &stage, &self.layouts)?;
+        let header: Header = read_buffer(frame, &buffers.work, 0, 1)?[0];
+        if !header.counts.fits(room) {
+            return Ok(header.counts);
+        }
+        let mut pass = frame.compute_pass("repair")?;
+        pass.set_pipeline(&self.tally);
+        self.set_dispatch_groups(&mut pass, frame, &stage);
+        pass.dispatch_workgroups(1, 1, 1);
+        drop(pass);
+        frame.repaired_pixels += u64::from(header.counts.wrong);
+        frame.cut_pixels += u64::from(header.cut_pixels);
+        if matches!(frame.goal, Goal::Layers(_)) {
+            self.layers.read(frame, &stage, &self.layouts)?;
+        }
+        Ok(header.counts)
+    }
+
+    /// Makes dispatches of what has been counted so far.
+    fn dispatches(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, step: &'static str) -> Result<(), GpuError> {
+        let mut pass = frame.compute_pass(step)?;
+        pass.set_pipeline(&self.prepare);
+        self.set_dispatch_groups(&mut pass, frame, stage);
+        pass.dispatch_workgroups(1, 1, 1);
+        Ok(())
+    }
+
+    fn set_dispatch_groups(&self, pass: &mut wgpu::ComputePass<'_>, frame: &Frame<'_>, stage: &Stage<'_>) {
+        let gpu = frame.gpu;
+        pass.set_bind_group(0, &frame.picture.bind_group, &[]);
+        pass.set_bind_group(2, &buffer_group(gpu, &self.layouts.dispatches, &[(0, &stage.buffers.dispatches)]), &[]);
+        pass.set_bind_group(3, &buffer_group(gpu, &self.layouts.work, &[(0, &stage.buffers.work)]), &[]);
+    }
+
+    fn picture_group(&self, frame: &Frame<'_>) -> BindGroup {
+        let (view, targets) = (wgpu::BindingResource::TextureView, frame.targets);
+        let resources = [
+            frame.frame_data.as_entire_binding(),
+            view(&targets.opaque_color_view),
+            view(&targets.opaque_depth_view),
+            view(&targets.picture_view),
+        ];
+        group(frame.gpu, &self.layouts.picture, resources)
+    }
+
+    fn scene_group(&self, frame: &Frame<'_>, draws: &wgpu::Buffer) -> BindGroup {
+        let Some(scene) = &self.scene else { unreachable!("it was loaded") };
+        let [positions, attributes, indices] = &frame.surfaces.scene().buffers;
+        let resources = [
+            positions.as_entire_binding(),
+            attributes.as_entire_binding(),
+            indices.as_entire_binding(),
+            draws.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&scene.atlas),
+        ];
+        group(frame.gpu, &self.layouts.scene, resources)
+    }
+}
+
+impl Capture for Lucid {
+    fn load(&mut self, gpu: &Context, scene: &Scene, upload: &SceneUpload) -> Result<(), GpuError> {
+        if self.scene.as_ref().is_some_and(|loaded| loaded.revision == scene.revision()) {
+            return Ok(());
+        }
+        self.learned.clear();
+        self.scene = None;
+        let quads = scene.meshes().iter().zip(&upload.meshes).map(|(mesh, uploaded)| setup::upload(gpu, mesh, uploaded));
+        let quads = quads.collect::<Result<Vec<_>, GpuError>>()?;
+        let atlas = upload.atlas.upload(gpu, scene.textures())?;
+        let pages = wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..wgpu::TextureViewDescriptor::default()
+        };
+        self.scene = Some(LoadedScene { revision: scene.revision(), quads, atlas: atlas.create_view(&pages) });
+        Ok(())
+    }
+
+    fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError> {
+        let gpu = frame.gpu;
+        frame.lone_share = self.scene.as_ref().map_or(0.0, LoadedScene::lone_share);
+        let draws = frame.surfaces.data.len() as u64;
+        let picture = u64::from(frame.view.width) * u64::from(frame.view.height);
+        let known = self.need(window);
+        let fits = |frame: &Frame<'_>, room: &Counts| frame.memory.fits(gpu, &work::needs(room, window, draws));
+        if let Some(counts) = known.filter(|counts| !fits(frame, counts)) {
+            return self.split(frame, window, counts);
+        }
+        let guess = || {
+            let share = (window.pixels() as f64 / picture as f64).sqrt();
+            Counts::guess(frame.scene.primitive_count().into(), window, share)
+        };
+        let wanted = known.map_or_else(guess, |counts| counts.with_slack());
+        let Some(share) = most_that_fits(1024, |share| fits(frame, &wanted.scaled(share))) else {
+            return self.split(frame, window, Counts::default());
+        };
+        // Without slack rather than with less than is known to be needed.
+        let mut room = wanted.scaled(share).max(&known.unwrap_or_default());
+        loop {
+            let counts = self.run(frame, window, &room)?;
+            if counts.fits(&room) {
+                self.learn(window, counts, false);
+                return Ok(Outcome::Done);
+            }
+            let needed = counts.max(&known.unwrap_or_default());
+            if !fits(frame, &needed) {
+                return self.split(frame, window, needed);
+            }
+            frame.rerenders += 1;
+            room = needed.max(&room);
+            if !fits(frame, &room) {
+                room = needed;
+            }
+        }
+    }
+}
+
+/// A layout of buffers by their bindings, each read only or not.
+fn buffers_layout(gpu: &Context, bindings: &[(u32, bool)]) -> BindGroupLayout {
+    let entries: Vec<_> =
+        bindings.iter().map(|&(binding, read_only)| storage_entry(binding, ShaderStages::COMPUTE, read_only)).collect();
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
+}
+
+fn buffer_group(gpu: &Context, layout: &BindGroupLayout, buffers: &[(u32, &wgpu::Buffer)]) -> BindGroup {
+    let entries: Vec<_> = buffers
+        .iter()
+        .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
+}
+
+fn group<const N: usize>(gpu: &Context, layout: &BindGroupLayout, resources: [wgpu::BindingResource<'_>; N]) -> BindGroup {
+    let entries: Vec<_> =
+        (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
+}
