@@ -309,10 +309,10 @@ pub(crate) struct CaptureArgs {
     /// Fragments of a pixel that lucid lets wait for nearer ones, from 1 to 12: with more of them, fewer pixels have to be
     /// rendered again. The picture is the same at any [default: 3]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    pub(crate) filter: Option<String>,
+    pub(crate) filter_size: Option<String>,
 
-    /// Let lucid leave blocks of pixels through which less than this share of light gets, from 0 to 1: faster, and not exact
-    /// above 0 [default: 0]
+    /// Let lucid leave pixels through which less than this share of light gets, from 0 to 1: faster, and not exact above 0
+    /// [default: 0]
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
     pub(crate) alpha_threshold: Option<String>,
 

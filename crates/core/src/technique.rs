@@ -119,7 +119,9 @@ impl Technique {
             Self::FBuffer => {
                 "8 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
             }
-            Self::Lucid => "4 B x pixels + 64 B x visible triangles + 36 B x their parts in blocks of 8 x 8 pixels",
+            Self::Lucid => {
+                "16.6 B x pixels + 64 B x visible triangles + 73 B x their parts in blocks of 8 x 8 pixels + 16 B x fragments"
+            }
         }
     }
 
@@ -137,7 +139,7 @@ impl Technique {
                 "gives every fragment a slot in rasterization order, then sorts them all into blending order"
             }
             Self::Lucid => {
-                "rasterizes in compute, sorts parts of triangles block by block, and mends pixels where that was not enough"
+                "rasterizes in compute, sorts parts of triangles block by block, and pixels where that was not enough"
             }
             Self::Pages => {
                 "links pages of fragments of each pixel, in one pass; repeats it if there was too little room"

@@ -260,6 +260,11 @@ impl<'a> Surfaces<'a> {
         self.draws.iter().filter(|draw| draw.pass == pass).count()
     }
 
+    /// Whether any draw of a part of the frame has to pass an alpha test.
+    pub(crate) fn has_cutoff(&self, pass: Pass) -> bool {
+        self.draws.iter().any(|draw| draw.pass == pass && draw.has_cutoff)
+    }
+
     /// What a recording of transparent surfaces depends on.
     pub(crate) fn structure(&self) -> Structure {
         Structure {

@@ -53,12 +53,10 @@ impl AtlasLayout {
             right += width;
             shelf_height = shelf_height.max(height);
         }
-        let places = corners.chunks_exact(2).map(|corners| {
-            AtlasPlace {
-                full_size: corners[0].1,
-                smaller: corners[1].1,
-                pages: corners[0].0 | corners[1].0 << 16,
-            }
+        let places = corners.chunks_exact(2).map(|corners| AtlasPlace {
+            full_size: corners[0].1,
+            smaller: corners[1].1,
+            pages: corners[0].0 | corners[1].0 << 16,
         });
         Self { side, pages: page + 1, places: places.collect() }
     }

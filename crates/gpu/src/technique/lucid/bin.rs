@@ -1,8 +1,12 @@
-//! From large triangles to blocks, and lists of every block's parts. Twins: `shaders/technique/lucid/{bin,scatter}.wesl`.
+//! From large triangles to blocks, lists of every block's parts, and what of them is hidden. Twins:
+//! `shaders/technique/lucid/{bin,scatter,hide}.wesl`.
 
-use wgpu::{BindGroupLayout, ComputePipeline};
+use std::collections::HashMap;
 
-use super::work::Dispatch;
+use pellucid_core::primitive::Pass;
+use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
+
+use super::work::{Dispatch, VARIES};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
@@ -17,12 +21,16 @@ pub(super) struct Bin {
     cover_blocks: ComputePipeline,
     list_buffers: BindGroupLayout,
     list_parts: ComputePipeline,
+    hide_buffers: BindGroupLayout,
+    hide_module: ShaderModule,
+    /// By whether colours vary, and whether there is an alpha test.
+    hide: HashMap<(bool, bool), ComputePipeline>,
 }
 
 impl Bin {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
         let buffers = buffers_layout(gpu, &[0, 1, 2, 3, 4].map(|binding| (binding, false)));
-        let list_buffers = buffers_layout(gpu, &[0, 3, 4, 5].map(|binding| (binding, false)));
+        let list_buffers = buffers_layout(gpu, &[0, 2, 3, 4, 5, 6].map(|binding| (binding, false)));
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -35,6 +43,9 @@ impl Bin {
             list_parts: pipeline("lists", &scatter, "main", &list_buffers),
             buffers,
             list_buffers,
+            hide_buffers: buffers_layout(gpu, &[(0, false), (1, true), (2, false), (3, false)]),
+            hide_module: shader(gpu, "hide", shaders::LUCID_HIDE),
+            hide: HashMap::new(),
         }
     }
 
@@ -70,14 +81,49 @@ impl Bin {
     /// Lists of every block's parts, once it is known how many come before each.
     pub(super) fn list_parts(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<(), GpuError> {
         let buffers = stage.buffers;
-        let bindings =
-            [(0, &buffers.work), (3, &buffers.places), (4, &buffers.block_parts), (5, &buffers.lists)];
+        let bindings = [
+            (0, &buffers.work),
+            (2, &buffers.parts),
+            (3, &buffers.places),
+            (4, &buffers.block_parts),
+            (5, &buffers.lists),
+            (6, &buffers.chunks),
+        ];
         let group = buffer_group(frame.gpu, &self.list_buffers, &bindings);
         let mut pass = frame.compute_pass("lists")?;
         pass.set_pipeline(&self.list_parts);
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
-        pass.dispatch_workgroups_indirect(&buffers.dispatches, Dispatch::Lists.offset());
+        pass.dispatch_workgroups_indirect(&buffers.dispatches, Dispatch::Parts.offset());
+        Ok(())
+    }
+
+    /// What lies behind opaque surfaces or fails an alpha test, if there are any.
+    pub(super) fn hide(
+        &mut self,
+        frame: &mut Frame<'_>,
+        stage: &Stage<'_>,
+        layouts: &OwnLayouts,
+    ) -> Result<(), GpuError> {
+        let tests_alpha = frame.surfaces.has_cutoff(Pass::Transparent);
+        if frame.surfaces.count(Pass::Opaque) == 0 && !tests_alpha {
+            return Ok(());
+        }
+        let (gpu, buffers) = (frame.gpu, stage.buffers);
+        let bindings = [(0, &buffers.work), (1, &buffers.records), (2, &buffers.parts), (3, &buffers.places)];
+        let group = buffer_group(gpu, &self.hide_buffers, &bindings);
+        let pipeline = self.hide.entry((stage.varies, tests_alpha)).or_insert_with(|| {
+            let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.hide_buffers)];
+            let constants =
+                [(VARIES, f64::from(u8::from(stage.varies))), ("tests_alpha", f64::from(u8::from(tests_alpha)))];
+            compute_pipeline(gpu, "hide", &self.hide_module, "main", &layouts, &constants)
+        });
+        let mut pass = frame.compute_pass("hide")?;
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &stage.picture, &[]);
+        pass.set_bind_group(1, &stage.scene, &[]);
+        pass.set_bind_group(3, &group, &[]);
+        pass.dispatch_workgroups_indirect(&buffers.dispatches, Dispatch::Parts.offset());
         Ok(())
     }
 }

@@ -7,42 +7,46 @@
 //! - `setup`: one invocation a quad culls, transforms and snaps it to the pixel grid, and finds what small triangles cover of
 //!   their blocks of 8 x 8 pixels, in integers. What has to be clipped is listed for the host, as it takes f64 (`record`).
 //! - `bin`: large triangles find their bins of 32 x 32 pixels, shared out evenly over invocations, and in those their blocks.
-//!   Then every block's parts of triangles are listed, behind each other.
-//! - `raster`: parts of a block are sorted by depth (in workgroup memory, in `low`; blocks with many by runs that are merged,
-//!   `sort` and `high`), shaded sample by sample, and blended pixel by pixel through a small filter by depth.
-//! - `repair`: pixels that left the filter out of order are rendered again by sweeps that take the next nearest.
-//! - `layers`: the ordered layers themselves, sorted pixel by pixel.
+//!   Then every block's parts of triangles are listed, behind each other, less what opaque surfaces hide.
+//! - `raster`: parts of a block are sorted by depth. Which of them cover each pixel is noted in bits, 32 parts at a time; then
+//!   each is shaded, and its fragments stored where their pixels have them next.
+//! - `blend`: fragments of a pixel, which are nearly in order, go through a small filter by depth to the resolve. Pixels that
+//!   leave it out of order are sorted, as in every LFB, and resolved again.
 //!
 //! What differs from the paper, and why:
 //!
 //! - Small triangles, which most are, go to blocks at set-up, not to bins and from there to blocks: one of few samples would
 //!   be read and rasterized twice to find one block.
-//! - Each block is a workgroup of its own, not each bin: lists of parts stand in global memory, sized by what is counted, so
-//!   that there is no limit to triangles in a block and 16 KiB of workgroup memory are enough.
+//! - Stages are passes over parts, blocks and pixels rather than workgroups that keep a bin in their memory: lists are as long
+//!   as counted, there is no limit to triangles in a block, and neither barriers nor memory of workgroups, which are what is
+//!   dear on llvmpipe. The price is that fragments are stored before they are blended, 16 bytes each, and that the threshold of
+//!   alpha saves blending but not shading.
 //! - Coverage is exact, and so is the order: pixels for which the filter was too small are found and mended, and equal depths
 //!   follow draw order. The depths that blocks are sorted by only decide how many have to be.
 //! - All buffers are as large as counters say; a window that overflows is repeated or split.
 
 mod bin;
-mod layers;
+mod blend;
 mod quads;
 mod raster;
 mod record;
-mod repair;
 mod setup;
 mod work;
 
 use std::collections::HashMap;
 
-use pellucid_core::Scene;
+use pellucid_core::{Resolve, Scene};
 use wgpu::{BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages};
 
-use self::work::{BLOCK_PARTS, Counts, DISPATCHES, DRAWS, Header, LISTS, PARTS, PLACES, RECORDS, WORK};
+use self::work::{
+    BLOCK_PARTS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS, ORDERED, PARTS,
+    PLACES, RECORDS, WORK, WRONG,
+};
 use super::growth::most_that_fits;
 use super::{Capture, Layouts, Outcome};
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
-use crate::pass::ordered::compute_pipeline;
+use crate::pass::ordered::{LfbShaders, OrderedPasses, compute_pipeline};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
 use crate::surface::{shader, storage_entry};
@@ -54,12 +58,12 @@ use crate::{Context, GpuError, shaders};
 pub struct DepthFilter {
     /// Fragments of a pixel that wait for nearer ones, from 1 to 12.
     pub size: u32,
-    /// Share of light, from 0 to 1: a block is left when less gets through at all its pixels. The picture is exact at 0 alone.
+    /// Share of light, from 0 to 1: a pixel is left when less gets through. The picture is exact at 0 alone.
     pub threshold: f32,
 }
 
 impl DepthFilter {
-    /// Fragments that can wait at most. Twin: `GREATEST_SIZE` in `shaders/technique/lucid/filter.wesl`.
+    /// Fragments that can wait at most: as many registers as `shaders/technique/lucid/filter.wesl` has.
     pub const GREATEST_SIZE: u32 = 12;
 }
 
@@ -76,6 +80,7 @@ const MOST_LEARNED: usize = 4096;
 #[derive(Debug, Clone, Copy)]
 struct Learned {
     counts: Counts,
+    fragments: u64,
     /// It did not fit, so there may be more than was counted.
     was_split: bool,
 }
@@ -87,11 +92,12 @@ pub(crate) struct Lucid {
     setup: setup::Setup,
     bin: bin::Bin,
     raster: raster::Raster,
-    repair: repair::Repair,
-    layers: layers::GatherLayers,
+    blend: blend::Blend,
+    ordered: OrderedPasses,
     prefix_sum: PrefixSum,
     prepare: ComputePipeline,
-    tally: ComputePipeline,
+    /// Of the fragments, as `linear` has them.
+    lfb: BindGroupLayout,
     scene: Option<LoadedScene>,
     learned: HashMap<Window, Learned>,
 }
@@ -131,7 +137,23 @@ struct Buffers {
     places: wgpu::Buffer,
     block_parts: wgpu::Buffer,
     lists: wgpu::Buffer,
+    chunks: wgpu::Buffer,
+    ordered: wgpu::Buffer,
+    offsets: wgpu::Buffer,
+    wrong: wgpu::Buffer,
     dispatches: wgpu::Buffer,
+}
+
+/// What became of an attempt at a window.
+enum Attempt {
+    /// It is drawn, with so much.
+    Done(Counts, u64),
+    /// There was too little room; so much is needed.
+    Overflow(Counts),
+    /// Its fragments do not fit.
+    TooMany(Counts, u64),
+    /// Buffers were larger than they had to be, and had to be given back.
+    Again,
 }
 
 /// What stages record with.
@@ -148,7 +170,8 @@ impl Lucid {
     pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
         let compute = ShaderStages::COMPUTE;
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None };
-        let texture = |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        let texture =
+            |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
         let uniform = BindingType::Buffer {
             ty: wgpu::BufferBindingType::Uniform,
             has_dynamic_offset: false,
@@ -188,50 +211,68 @@ impl Lucid {
             work: buffers_layout(gpu, &[(0, false)]),
         };
         let module = shader(gpu, "dispatches", shaders::LUCID_DISPATCH);
-        let groups = [Some(layouts.picture), None, Some(&own.dispatches), Some(&own.work)];
-        let pipeline = |entry| compute_pipeline(gpu, "dispatches", &module, entry, &groups, &[]);
+        let groups = [None, None, Some(&own.dispatches), Some(&own.work)];
+        let lfb = blend::lfb_layout(gpu);
+        let lfb_shaders = LfbShaders {
+            classify: shaders::CLASSIFY_LINEAR,
+            sort: Some(shaders::SORT_LINEAR),
+            resolve: shaders::RESOLVE_LINEAR,
+            gather: shaders::GATHER_LINEAR,
+        };
+        let ordered = OrderedPasses::new(gpu, lfb_shaders, layouts.picture, &lfb);
         Self {
             setup: setup::Setup::new(gpu, layouts.surfaces),
             bin: bin::Bin::new(gpu, &own),
             raster: raster::Raster::new(gpu, &own),
-            repair: repair::Repair::new(gpu),
-            layers: layers::GatherLayers::new(gpu),
+            blend: blend::Blend::new(gpu, layouts, &ordered, &lfb),
+            ordered,
             prefix_sum: PrefixSum::new(gpu),
-            prepare: pipeline("prepare"),
-            tally: pipeline("tally"),
+            prepare: compute_pipeline(gpu, "dispatches", &module, "prepare", &groups, &[]),
+            lfb,
             layouts: own,
             scene: None,
             learned: HashMap::new(),
         }
     }
 
-    /// How much a window is likely to take; split windows as much as their parts.
-    fn need(&self, window: Window) -> Option<Counts> {
+    /// How much a window is likely to take, with its fragments; split windows as much as their parts.
+    fn need(&self, window: Window) -> Option<(Counts, u64)> {
         let learned = self.learned.get(&window)?;
         if !learned.was_split {
-            return Some(learned.counts);
+            return Some((learned.counts, learned.fragments));
         }
-        let [a, b] = window.halves()?.map(|half| self.need(half));
-        Some(a?.plus(&b?))
+        let [(a, a_fragments), (b, b_fragments)] = match window.halves()?.map(|half| self.need(half)) {
+            [Some(a), Some(b)] => [a, b],
+            _ => return None,
+        };
+        Some((a.plus(&b), a_fragments + b_fragments))
     }
 
-    fn learn(&mut self, window: Window, counts: Counts, was_split: bool) {
+    fn learn(&mut self, window: Window, learned: Learned) {
         if self.learned.len() >= MOST_LEARNED {
             self.learned.clear();
         }
-        self.learned.insert(window, Learned { counts, was_split });
+        self.learned.insert(window, learned);
     }
 
-    fn split(&mut self, frame: &Frame<'_>, window: Window, counts: Counts) -> Result<Outcome, GpuError> {
-        self.learn(window, counts, true);
+    fn split(
+        &mut self,
+        frame: &Frame<'_>,
+        window: Window,
+        counts: Counts,
+        fragments: u64,
+    ) -> Result<Outcome, GpuError> {
+        self.learn(window, Learned { counts, fragments, was_split: true });
         let draws = frame.surfaces.data.len() as u64;
-        frame.memory.halves(frame.gpu, window, &work::needs(&counts, window, draws))
+        frame.memory.halves(frame.gpu, window, &work::needs(&counts, fragments, window, draws))
     }
 
-    /// Draws a window, unless there is too little room; says how much was needed.
-    fn run(&mut self, frame: &mut Frame<'_>, window: Window, room: &Counts) -> Result<Counts, GpuError> {
+    /// Draws a window, unless there is too little room.
+    fn run(&mut self, frame: &mut Frame<'_>, window: Window, room: &Counts) -> Result<Attempt, GpuError> {
         let gpu = frame.gpu;
-        let needs = work::needs(room, window, frame.surfaces.data.len() as u64);
+        let draws = frame.surfaces.data.len() as u64;
+        let needs = work::needs(room, 0, window, draws);
+        // Fragments of the frame before stay where they are, unless they are in the way.
         frame.memory.make_room(&needs);
         let mut buffer = |name| {
             let bytes = needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
@@ -244,21 +285,26 @@ impl Lucid {
             places: buffer(PLACES)?,
             block_parts: buffer(BLOCK_PARTS)?,
             lists: buffer(LISTS)?,
+            chunks: buffer(CHUNKS)?,
+            ordered: buffer(ORDERED)?,
+            offsets: buffer(OFFSETS)?,
+            wrong: buffer(WRONG)?,
             dispatches: buffer(DISPATCHES)?,
         };
-        let draws = buffer(DRAWS)?;
+        let all_draws = buffer(DRAWS)?;
         frame.submit()?;
-        gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room, window)));
-        gpu.queue.write_buffer(&draws, 0, bytemuck::cast_slice(&frame.surfaces.data));
+        gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room)));
+        gpu.queue.write_buffer(&all_draws, 0, bytemuck::cast_slice(&frame.surfaces.data));
         let stage = Stage {
             window,
             picture: self.picture_group(frame),
-            scene: self.scene_group(frame, &draws),
+            scene: self.scene_group(frame, &all_draws),
             varies: frame.surfaces.compute_draws().any(|draw| draw.varies),
             buffers: &buffers,
         };
 
         frame.zero("zero", &buffers.block_parts, buffers.block_parts.size())?;
+        frame.zero("zero", &buffers.chunks, buffers.chunks.size())?;
         let Some(scene) = &self.scene else { unreachable!("it was loaded") };
         self.setup.record(frame, &stage, &scene.quads)?;
         if room.clipped > 0 {
@@ -266,39 +312,66 @@ impl Lucid {
             if !header.counts.fits(room) || !setup::clip(frame, &stage, &header)? {
                 let more = header.counts.clipped.saturating_mul(16);
                 let counts = header.counts;
-                return Ok(Counts {
+                return Ok(Attempt::Overflow(Counts {
                     records: counts.records.saturating_add(more),
                     large: counts.large.saturating_add(more),
                     ..counts
-                });
+                }));
             }
         }
         self.dispatches(frame, &stage, "bins")?;
         self.bin.find_bins(frame, &stage)?;
         self.dispatches(frame, &stage, "bins")?;
         self.bin.cover_blocks(frame, &stage)?;
-        self.prefix_sum.record(frame, "prefix sums", &buffers.block_parts, work::blocks(window) + 1)?;
+        self.sums(frame, window, &buffers.block_parts, work::blocks(window) + 1)?;
         self.dispatches(frame, &stage, "lists")?;
         self.bin.list_parts(frame, &stage)?;
+        self.bin.hide(frame, &stage, &self.layouts)?;
         self.dispatches(frame, &stage, "sort")?;
-        self.raster.record(frame, &stage, &self.layouts)?;
-        self.dispatches(frame, &stage, "repair")?;
-        self.repair.record(frame, &stage, &self.layouts)?;
+        self.raster.sort_chunks(frame, &stage)?;
         let header: Header = read_buffer(frame, &buffers.work, 0, 1)?[0];
-        if !header.counts.fits(room) {
-            return Ok(header.counts);
+        let counts = header.counts;
+        if !counts.fits(room) {
+            return Ok(Attempt::Overflow(counts));
         }
-        let mut pass = frame.compute_pass("repair")?;
-        pass.set_pipeline(&self.tally);
-        self.set_dispatch_groups(&mut pass, frame, &stage);
-        pass.dispatch_workgroups(1, 1, 1);
-        drop(pass);
-        frame.repaired_pixels += u64::from(header.counts.wrong);
-        frame.cut_pixels += u64::from(header.cut_pixels);
-        if matches!(frame.goal, Goal::Layers(_)) {
-            self.layers.read(frame, &stage, &self.layouts)?;
+        self.raster.merge(frame, &stage, &header)?;
+        self.raster.count(frame, &stage, &counts)?;
+        let pixels = window.pixels();
+        self.sums(frame, window, &buffers.offsets, pixels + 1)?;
+        let total: u32 = read_buffer(frame, &buffers.offsets, pixels, 1)?[0];
+        let fragment_count = u64::from(total);
+        let with_fragments = work::needs(room, fragment_count, window, draws);
+        // Sums stick at the greatest number.
+        if total == u32::MAX || !frame.memory.fits(gpu, &with_fragments) {
+            return Ok(Attempt::TooMany(counts, fragment_count));
         }
-        Ok(header.counts)
+        if frame.memory.make_room(&with_fragments) {
+            return Ok(Attempt::Again);
+        }
+        let fragments = frame.memory.buffer(gpu, FRAGMENTS, fragment_count * FRAGMENT_BYTES)?;
+        self.raster.shade(frame, &stage, &self.layouts, (&counts, &fragments))?;
+        let lfb = buffer_group(gpu, &self.lfb, &[(0, &buffers.offsets), (1, &fragments)]);
+        let needs_no_order = matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
+        if matches!(frame.goal, Goal::Layers(_)) || needs_no_order || frame.presort {
+            self.ordered.record(frame, window, &lfb)?;
+        } else {
+            let listed = self.ordered.list(frame, window, &lfb, true)?;
+            self.blend.record(frame, window, &listed, &lfb, [&buffers.wrong, &buffers.dispatches])?;
+        }
+        frame.half_block_parts += u64::from(counts.half_blocks);
+        Ok(Attempt::Done(counts, fragment_count))
+    }
+
+    /// Sums up values in buffers that are large enough for those of pixels, too.
+    fn sums(&self, frame: &mut Frame<'_>, window: Window, values: &wgpu::Buffer, length: u64) -> Result<(), GpuError> {
+        let gpu = frame.gpu;
+        let mut buffers = vec![values.clone()];
+        for (name, bytes) in PrefixSum::needs(window.pixels() + 1) {
+            buffers.push(frame.memory.buffer(gpu, name, bytes)?);
+        }
+        let groups = self.prefix_sum.groups(gpu, length, &buffers)?;
+        self.prefix_sum.run(&mut frame.compute_pass("prefix sums")?, &groups);
+        Ok(())
     }
 
     /// Makes dispatches of what has been counted so far.
@@ -312,7 +385,6 @@ impl Lucid {
 
     fn set_dispatch_groups(&self, pass: &mut wgpu::ComputePass<'_>, frame: &Frame<'_>, stage: &Stage<'_>) {
         let gpu = frame.gpu;
-        pass.set_bind_group(0, &frame.picture.bind_group, &[]);
         pass.set_bind_group(2, &buffer_group(gpu, &self.layouts.dispatches, &[(0, &stage.buffers.dispatches)]), &[]);
         pass.set_bind_group(3, &buffer_group(gpu, &self.layouts.work, &[(0, &stage.buffers.work)]), &[]);
     }
@@ -349,7 +421,8 @@ impl Capture for Lucid {
         }
         self.learned.clear();
         self.scene = None;
-        let quads = scene.meshes().iter().zip(&upload.meshes).map(|(mesh, uploaded)| setup::upload(gpu, mesh, uploaded));
+        let quads =
+            scene.meshes().iter().zip(&upload.meshes).map(|(mesh, uploaded)| setup::upload(gpu, mesh, uploaded));
         let quads = quads.collect::<Result<Vec<_>, GpuError>>()?;
         let atlas = upload.atlas.upload(gpu, scene.textures())?;
         let pages = wgpu::TextureViewDescriptor {
@@ -366,34 +439,50 @@ impl Capture for Lucid {
         let draws = frame.surfaces.data.len() as u64;
         let picture = u64::from(frame.view.width) * u64::from(frame.view.height);
         let known = self.need(window);
-        let fits = |frame: &Frame<'_>, room: &Counts| frame.memory.fits(gpu, &work::needs(room, window, draws));
-        if let Some(counts) = known.filter(|counts| !fits(frame, counts)) {
-            return self.split(frame, window, counts);
+        let known_fragments = known.map_or(0, |(_, fragments)| fragments);
+        let fits = |frame: &Frame<'_>, room: &Counts, fragments| {
+            frame.memory.fits(gpu, &work::needs(room, fragments, window, draws))
+        };
+        if let Some((counts, fragments)) = known.filter(|(counts, fragments)| !fits(frame, counts, *fragments)) {
+            return self.split(frame, window, counts, fragments);
         }
         let guess = || {
             let share = (window.pixels() as f64 / picture as f64).sqrt();
             Counts::guess(frame.scene.primitive_count().into(), window, share)
         };
+        let known = known.map(|(counts, _)| counts);
         let wanted = known.map_or_else(guess, |counts| counts.with_slack());
-        let Some(share) = most_that_fits(1024, |share| fits(frame, &wanted.scaled(share))) else {
-            return self.split(frame, window, Counts::default());
+        let Some(share) = most_that_fits(1024, |share| fits(frame, &wanted.scaled(share), known_fragments)) else {
+            return self.split(frame, window, known.unwrap_or_default(), known_fragments);
         };
         // Without slack rather than with less than is known to be needed.
         let mut room = wanted.scaled(share).max(&known.unwrap_or_default());
         loop {
-            let counts = self.run(frame, window, &room)?;
-            if counts.fits(&room) {
-                self.learn(window, counts, false);
-                return Ok(Outcome::Done);
-            }
-            let needed = counts.max(&known.unwrap_or_default());
-            if !fits(frame, &needed) {
-                return self.split(frame, window, needed);
-            }
-            frame.rerenders += 1;
-            room = needed.max(&room);
-            if !fits(frame, &room) {
-                room = needed;
+            match self.run(frame, window, &room)? {
+                Attempt::Done(counts, fragments) => {
+                    self.learn(window, Learned { counts, fragments, was_split: false });
+                    return Ok(Outcome::Done);
+                }
+                Attempt::TooMany(counts, fragments) => {
+                    if !fits(frame, &counts, fragments) {
+                        return self.split(frame, window, counts, fragments);
+                    }
+                    // With less room for what turned out to be less.
+                    frame.rerenders += 1;
+                    room = counts;
+                }
+                Attempt::Again => frame.rerenders += 1,
+                Attempt::Overflow(counts) => {
+                    let needed = counts.max(&known.unwrap_or_default());
+                    if !fits(frame, &needed, known_fragments) {
+                        return self.split(frame, window, needed, known_fragments);
+                    }
+                    frame.rerenders += 1;
+                    room = needed.max(&room);
+                    if !fits(frame, &room, known_fragments) {
+                        room = needed;
+                    }
+                }
             }
         }
     }
@@ -414,7 +503,11 @@ fn buffer_group(gpu: &Context, layout: &BindGroupLayout, buffers: &[(u32, &wgpu:
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
 }
 
-fn group<const N: usize>(gpu: &Context, layout: &BindGroupLayout, resources: [wgpu::BindingResource<'_>; N]) -> BindGroup {
+fn group<const N: usize>(
+    gpu: &Context,
+    layout: &BindGroupLayout,
+    resources: [wgpu::BindingResource<'_>; N],
+) -> BindGroup {
     let entries: Vec<_> =
         (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })

@@ -183,6 +183,33 @@ mod tests {
         }
     }
 
+    /// Triangles between any vertices: shared by many, turned over, degenerate, twice.
+    #[test]
+    fn every_triangle_of_any_mesh_is_in_one_quad() {
+        let mut state = 7u32;
+        let mut random = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        let mut paired = 0;
+        for _ in 0..300 {
+            let vertices = 1 + random(30);
+            let positions: Vec<Vec3> = (0..vertices).map(|_| Vec3::from([(); 3].map(|()| random(5) as f32))).collect();
+            let triangles: Vec<[u32; 3]> = (0..random(80)).map(|_| [(); 3].map(|()| random(vertices))).collect();
+            let count = triangles.len();
+            let mesh = Mesh::new(positions, triangles).unwrap();
+            let quads = quads(&mesh, 5);
+            check(&mesh, &quads, 5);
+            assert_eq!(2 * quads.len() - lone(&quads), count);
+            paired += quads.len() - lone(&quads);
+            // No two that are alone could be one.
+            let alone: Vec<u32> = quads.iter().filter(|quad| quad[5] == NO_TRIANGLE).map(|quad| quad[4]).collect();
+            let is_left = |candidate: &Candidate| candidate.triangles.iter().all(|triangle| alone.contains(triangle));
+            assert!(!candidates(&mesh).iter().any(is_left), "not maximal");
+        }
+        assert!(paired > 300, "{paired}");
+    }
+
     #[test]
     fn what_shares_nothing_or_is_turned_over_stays_alone() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE, Vec3::new(1e3, 1e-3, 0.0)];

@@ -1,84 +1,153 @@
-//! Sorting, shading and blending of blocks. Twins: `shaders/technique/lucid/{raster,sort,filter,shade}.wesl`.
+//! From parts of triangles to fragments of pixels. Twins: `shaders/technique/lucid/{sort,cover,raster,shade}.wesl`.
 
 use std::collections::HashMap;
 
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::{Dispatch, FILTER_SIZE, VARIES};
-use super::{DepthFilter, OwnLayouts, Stage, buffer_group, buffers_layout};
+use super::work::{Counts, Dispatch, Header, VARIES};
+use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
+use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
-use crate::pass::ordered::{compute_pipeline, resolve_code};
+use crate::pass::ordered::compute_pipeline;
+use crate::pass::picture::GROUP_PX;
 use crate::surface::shader;
 use crate::{Context, GpuError, shaders};
 
-/// What a pipeline is made for: resolve, whether colours vary, size of the filter, bits of the threshold.
-type Key = (&'static str, u32, bool, u32, u32);
+/// Invocations of a workgroup in chunks.
+const CHUNKS_A_GROUP: u64 = 2;
 
 /// Long-lived half.
 #[derive(Debug)]
 pub(super) struct Raster {
-    buffers: BindGroupLayout,
-    module: ShaderModule,
-    pipelines: HashMap<Key, ComputePipeline>,
     sort_buffers: BindGroupLayout,
-    sort: ComputePipeline,
+    sort_chunks: ComputePipeline,
+    next_level: ComputePipeline,
+    merge_runs: ComputePipeline,
+    cover_buffers: BindGroupLayout,
+    mark: ComputePipeline,
+    count_fragments: ComputePipeline,
+    place_fragments: ComputePipeline,
+    shade_buffers: BindGroupLayout,
+    shade_module: ShaderModule,
+    /// By whether colours vary.
+    shade: HashMap<bool, ComputePipeline>,
 }
 
 impl Raster {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
-        let sort_buffers = buffers_layout(gpu, &[0, 2, 3, 5].map(|binding| (binding, false)));
-        let sort_module = shader(gpu, "sort", shaders::LUCID_SORT);
-        let sort_layouts = [Some(&layouts.picture), None, None, Some(&sort_buffers)];
+        let sort_buffers = buffers_layout(gpu, &[0, 2, 3, 5, 6, 7].map(|binding| (binding, false)));
+        let cover_buffers = buffers_layout(gpu, &[(4, true), (6, false), (7, true), (8, false)]);
+        let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
+            let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
+            compute_pipeline(gpu, label, module, entry, &layouts, &[])
+        };
+        let sort = shader(gpu, "sort", shaders::LUCID_SORT);
+        let cover = shader(gpu, "cover", shaders::LUCID_COVER);
         Self {
-            buffers: buffers_layout(gpu, &[(0, false), (1, true), (2, true), (5, true)]),
-            module: shader(gpu, "raster", shaders::LUCID_RASTER),
-            pipelines: HashMap::new(),
-            sort: compute_pipeline(gpu, "sort", &sort_module, "main", &sort_layouts, &[]),
+            sort_chunks: pipeline("sort", &sort, "sort_chunks", &sort_buffers),
+            next_level: pipeline("sort", &sort, "next_level", &sort_buffers),
+            merge_runs: pipeline("sort", &sort, "merge_runs", &sort_buffers),
             sort_buffers,
+            mark: pipeline("cover", &cover, "mark", &cover_buffers),
+            count_fragments: pipeline("cover", &cover, "count_fragments", &cover_buffers),
+            place_fragments: pipeline("places", &cover, "place_fragments", &cover_buffers),
+            cover_buffers,
+            shade_buffers: buffers_layout(gpu, &[(1, true), (6, true), (7, true), (9, false)]),
+            shade_module: shader(gpu, "shade", shaders::LUCID_RASTER),
+            shade: HashMap::new(),
         }
     }
 
-    /// Blocks with few parts, then those with many, which are sorted before.
-    pub(super) fn record(
+    /// Parts of each chunk in order. Finds out which merges there are.
+    pub(super) fn sort_chunks(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<(), GpuError> {
+        let mut pass = self.sort_pass(frame, stage)?;
+        pass.set_pipeline(&self.sort_chunks);
+        pass.dispatch_workgroups_indirect(&stage.buffers.dispatches, Dispatch::Chunks.offset());
+        Ok(())
+    }
+
+    /// Parts of all blocks in order.
+    pub(super) fn merge(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, header: &Header) -> Result<(), GpuError> {
+        let merges = header.merges.into_iter().take_while(|&merges| merges > 0);
+        let mut pass = self.sort_pass(frame, stage)?;
+        for count in merges {
+            pass.set_pipeline(&self.next_level);
+            pass.dispatch_workgroups(1, 1, 1);
+            pass.set_pipeline(&self.merge_runs);
+            dispatch(&mut pass, u64::from(count).div_ceil(LANES));
+        }
+        Ok(())
+    }
+
+    fn sort_pass(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<wgpu::ComputePass<'static>, GpuError> {
+        let buffers = stage.buffers;
+        let bindings = [
+            (0, &buffers.work),
+            (2, &buffers.parts),
+            (3, &buffers.places),
+            (5, &buffers.lists),
+            (6, &buffers.chunks),
+            (7, &buffers.ordered),
+        ];
+        let group = buffer_group(frame.gpu, &self.sort_buffers, &bindings);
+        let mut pass = frame.compute_pass("sort")?;
+        pass.set_bind_group(0, &stage.picture, &[]);
+        pass.set_bind_group(3, &group, &[]);
+        Ok(pass)
+    }
+
+    /// Which parts cover each pixel, and how many that are.
+    pub(super) fn count(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, counts: &Counts) -> Result<(), GpuError> {
+        let mut pass = self.cover_pass(frame, stage, "cover")?;
+        pass.set_pipeline(&self.mark);
+        dispatch(&mut pass, u64::from(counts.chunks).div_ceil(CHUNKS_A_GROUP));
+        pass.set_pipeline(&self.count_fragments);
+        pass.dispatch_workgroups(stage.window.width.div_ceil(GROUP_PX), stage.window.height.div_ceil(GROUP_PX), 1);
+        Ok(())
+    }
+
+    /// How many fragments come before those of each chunk at each pixel; then the fragments.
+    pub(super) fn shade(
         &mut self,
         frame: &mut Frame<'_>,
         stage: &Stage<'_>,
         layouts: &OwnLayouts,
+        (counts, fragments): (&Counts, &wgpu::Buffer),
     ) -> Result<(), GpuError> {
-        let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (5, &buffers.lists)];
-        let group = buffer_group(gpu, &self.sort_buffers, &bindings);
-        let mut pass = frame.compute_pass("sort")?;
-        pass.set_pipeline(&self.sort);
-        pass.set_bind_group(0, &stage.picture, &[]);
-        pass.set_bind_group(3, &group, &[]);
-        pass.dispatch_workgroups_indirect(&buffers.dispatches, Dispatch::High.offset());
+        let mut pass = self.cover_pass(frame, stage, "cover")?;
+        pass.set_pipeline(&self.place_fragments);
+        pass.dispatch_workgroups(stage.window.width.div_ceil(GROUP_PX), stage.window.height.div_ceil(GROUP_PX), 1);
         drop(pass);
 
-        let bindings = [(0, &buffers.work), (1, &buffers.records), (2, &buffers.parts), (5, &buffers.lists)];
-        let group = buffer_group(gpu, &self.buffers, &bindings);
-        let DepthFilter { size, threshold } = frame.depth_filter;
-        let size = size.clamp(1, DepthFilter::GREATEST_SIZE);
-        let code = resolve_code(frame.resolve);
-        for (step, entry, dispatch) in [("raster low", "low", Dispatch::Low), ("raster high", "high", Dispatch::High)] {
-            let key = (entry, code, stage.varies, size, threshold.to_bits());
-            let pipeline = self.pipelines.entry(key).or_insert_with(|| {
-                let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.buffers)];
-                let constants = [
-                    ("resolve", f64::from(code)),
-                    (VARIES, f64::from(u8::from(stage.varies))),
-                    (FILTER_SIZE, f64::from(size)),
-                    ("threshold", f64::from(threshold)),
-                ];
-                compute_pipeline(gpu, step, &self.module, entry, &layouts, &constants)
-            });
-            let mut pass = frame.compute_pass(step)?;
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &stage.picture, &[]);
-            pass.set_bind_group(1, &stage.scene, &[]);
-            pass.set_bind_group(3, &group, &[]);
-            pass.dispatch_workgroups_indirect(&buffers.dispatches, dispatch.offset());
-        }
+        let (gpu, buffers) = (frame.gpu, stage.buffers);
+        let bindings = [(1, &buffers.records), (6, &buffers.chunks), (7, &buffers.ordered), (9, fragments)];
+        let group = buffer_group(gpu, &self.shade_buffers, &bindings);
+        let pipeline = self.shade.entry(stage.varies).or_insert_with(|| {
+            let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.shade_buffers)];
+            let constants = [(VARIES, f64::from(u8::from(stage.varies)))];
+            compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &constants)
+        });
+        let mut pass = frame.compute_pass("shade")?;
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &stage.picture, &[]);
+        pass.set_bind_group(1, &stage.scene, &[]);
+        pass.set_bind_group(3, &group, &[]);
+        dispatch(&mut pass, u64::from(counts.chunks).div_ceil(CHUNKS_A_GROUP));
         Ok(())
+    }
+
+    fn cover_pass(
+        &self,
+        frame: &mut Frame<'_>,
+        stage: &Stage<'_>,
+        step: &'static str,
+    ) -> Result<wgpu::ComputePass<'static>, GpuError> {
+        let buffers = stage.buffers;
+        let bindings = [(4, &buffers.block_parts), (6, &buffers.chunks), (7, &buffers.ordered), (8, &buffers.offsets)];
+        let group = buffer_group(frame.gpu, &self.cover_buffers, &bindings);
+        let mut pass = frame.compute_pass(step)?;
+        pass.set_bind_group(0, &stage.picture, &[]);
+        pass.set_bind_group(3, &group, &[]);
+        Ok(pass)
     }
 }

@@ -39,12 +39,7 @@ impl Setup {
     }
 
     /// Sets up all transparent surfaces, draw by draw.
-    pub(super) fn record(
-        &self,
-        frame: &mut Frame<'_>,
-        stage: &Stage<'_>,
-        quads: &[MeshQuads],
-    ) -> Result<(), GpuError> {
+    pub(super) fn record(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, quads: &[MeshQuads]) -> Result<(), GpuError> {
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let [positions, ..] = &frame.surfaces.scene().buffers;
         let positions = buffer_group(gpu, &self.positions, &[(0, positions)]);

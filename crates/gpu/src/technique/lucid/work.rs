@@ -5,14 +5,21 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::gpu_data::DrawData;
 use crate::memory::Window;
+use crate::pass::ordered::OrderedPasses;
 use crate::pass::prefix_sum::PrefixSum;
 
 /// Pixels along a side of a block, and of a bin.
 pub(super) const BLOCK: u64 = 8;
 pub(super) const BIN: u64 = 32;
 
-/// Parts of a block that are sorted in workgroup memory. Twin: `CHUNK`.
-pub(super) const CHUNK: u64 = 1024;
+/// Parts of a chunk, as a power of two, and runs that are merged at a time, likewise; levels of merges. Twins:
+/// `shaders/technique/lucid/{chunks,sort}.wesl`.
+const CHUNK_POWER: u64 = 5;
+const FAN: u64 = 3;
+pub(super) const LEVELS: usize = 7;
+
+/// Words of a chunk. Twin: `CHUNK_WORDS`.
+const CHUNK_WORDS: u64 = 133;
 
 /// Constants of shaders by their numbers, as names of imported modules change when they are linked: `varies` in
 /// `shaders/technique/lucid/shade.wesl`, `filter_size` in `filter.wesl`.
@@ -25,14 +32,24 @@ pub(super) const PARTS: &str = "parts of triangles";
 pub(super) const PLACES: &str = "places of parts";
 pub(super) const BLOCK_PARTS: &str = "blocks' parts";
 pub(super) const LISTS: &str = "lists of parts";
-pub(super) const DISPATCHES: &str = "dispatches";
+pub(super) const CHUNKS: &str = "chunks of parts";
+pub(super) const ORDERED: &str = "parts in order";
+pub(super) const OFFSETS: &str = "offsets";
+pub(super) const FRAGMENTS: &str = "fragments";
+pub(super) const WRONG: &str = "pixels out of order";
+pub(super) const DISPATCHES: &str = "dispatches of bins and lists";
 pub(super) const DRAWS: &str = "all draws";
 
 /// Bytes of a triangle's record: four groups of four words.
 pub(super) const RECORD_BYTES: u64 = 64;
 const PART_BYTES: u64 = 16;
 const PLACE_BYTES: u64 = 12;
-const LISTED_BYTES: u64 = 8;
+const LISTED_BYTES: u64 = 12;
+/// Of a stored fragment.
+pub(super) const FRAGMENT_BYTES: u64 = 16;
+
+/// Words before the list of pixels out of order. Twin: `CLASSES` in `shaders/shared/classes.wesl`.
+const WRONG_HEADER: u64 = 5;
 
 /// Items of each list, or room for as many; in the order of the header's words.
 #[repr(C)]
@@ -48,11 +65,12 @@ pub(super) struct Counts {
     pub(super) clipped: u32,
     /// Large ones, each with a bin.
     pub(super) pairs: u32,
-    /// Blocks with more than [`CHUNK`] parts.
-    pub(super) high: u32,
-    /// Pixels out of order.
-    pub(super) wrong: u32,
-    pub(super) unused: u32,
+    /// Chunks of parts that follow each other in a block.
+    pub(super) chunks: u32,
+    /// No count; where its list starts, that of merges does.
+    pub(super) merge_lists: u32,
+    /// Parts in half-blocks.
+    pub(super) half_blocks: u32,
 }
 
 /// The first words of the work buffer.
@@ -63,11 +81,10 @@ pub(super) struct Header {
     pub(super) room: Counts,
     /// First word of each list.
     pub(super) first: Counts,
-    /// Covered pixels, most fragments of one, all fragments (low and high word).
-    pub(super) tally: [u32; 4],
-    /// Pixels of blocks that were left early.
-    pub(super) cut_pixels: u32,
-    pub(super) unused: [u32; 3],
+    /// At which merges are.
+    pub(super) level: u32,
+    /// How many merges each level has.
+    pub(super) merges: [u32; LEVELS],
 }
 
 const HEADER_WORDS: u64 = size_of::<Header>() as u64 / 4;
@@ -77,14 +94,12 @@ const HEADER_WORDS: u64 = size_of::<Header>() as u64 / 4;
 pub(super) enum Dispatch {
     Bins,
     Blocks,
-    Lists,
-    Low,
-    High,
-    Repair,
+    Parts,
+    Chunks,
 }
 
 impl Dispatch {
-    const COUNT: u64 = 6;
+    const COUNT: u64 = 4;
 
     /// Where its words are.
     pub(super) fn offset(self) -> u64 {
@@ -152,9 +167,7 @@ impl Counts {
 }
 
 /// Lists in the work buffer: their first words, and the word after the last.
-fn list_places(room: &Counts, window: Window) -> (Counts, Counts, u64) {
-    let high = (u64::from(room.parts) / CHUNK).min(blocks(window)) as u32;
-    let room = Counts { high, wrong: window.pixels() as u32, ..*room };
+fn list_places(room: &Counts) -> (Counts, u64) {
     let mut next = HEADER_WORDS;
     let mut list = |words: u64| {
         let first = next;
@@ -167,33 +180,100 @@ fn list_places(room: &Counts, window: Window) -> (Counts, Counts, u64) {
         large: list(room.large.into()),
         clipped: list(u64::from(room.clipped) * 2),
         pairs: list(u64::from(room.pairs) * 2),
-        high: list(room.high.into()),
-        wrong: list(room.wrong.into()),
-        unused: 0,
+        chunks: 0,
+        merge_lists: list((0..LEVELS as u64).map(|lower| u64::from(room.parts) >> (CHUNK_POWER + FAN * lower)).sum()),
+        half_blocks: 0,
     };
-    (room, first, next)
+    (first, next)
 }
 
 /// The header for a window.
-pub(super) fn header(room: &Counts, window: Window) -> Header {
-    let (room, first, _) = list_places(room, window);
-    Header { room, first, ..Header::default() }
+pub(super) fn header(room: &Counts) -> Header {
+    let (first, _) = list_places(room);
+    Header { room: *room, first, ..Header::default() }
 }
 
-/// All buffers of a window with so much room.
-pub(super) fn needs(room: &Counts, window: Window, draws: u64) -> Vec<(&'static str, u64)> {
-    let (_, _, words) = list_places(room, window);
-    let (parts, starts) = (u64::from(room.parts), blocks(window) + 1);
+/// All buffers of a window with so much room, and so many fragments.
+pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -> Vec<(&'static str, u64)> {
+    let (_, words) = list_places(room);
+    let (parts, starts, pixels) = (u64::from(room.parts), blocks(window) + 1, window.pixels());
+    // Each block has one chunk more than it needs, at most.
+    let chunks = (parts >> CHUNK_POWER) + starts;
     let mut needs = vec![
         (WORK, words * 4),
         (RECORDS, u64::from(room.records) * RECORD_BYTES),
         (PARTS, parts * PART_BYTES),
         (PLACES, parts * PLACE_BYTES),
         (BLOCK_PARTS, starts * 4),
-        (LISTS, (starts + parts) * LISTED_BYTES),
+        (LISTS, parts * LISTED_BYTES),
+        (CHUNKS, chunks * CHUNK_WORDS * 4),
+        (ORDERED, parts * PART_BYTES),
+        (OFFSETS, (pixels + 1) * 4),
+        (FRAGMENTS, fragments * FRAGMENT_BYTES),
+        (WRONG, (WRONG_HEADER + pixels) * 4),
         (DISPATCHES, Dispatch::COUNT * 12),
         (DRAWS, draws * size_of::<DrawData>() as u64),
     ];
-    needs.extend(PrefixSum::needs(starts));
+    // Those of blocks take the same.
+    needs.extend(PrefixSum::needs(pixels + 1));
+    needs.extend(OrderedPasses::needs(pixels));
     needs
+}
+
+#[cfg(test)]
+mod tests {
+    use std::mem::offset_of;
+
+    use super::*;
+
+    /// A constant of a shader.
+    fn constant(source: &str, name: &str) -> u64 {
+        let value = source.split(&format!("const {name}: u32 = ")).nth(1).and_then(|rest| rest.split("u;").next());
+        value.and_then(|value| value.parse().ok()).unwrap_or_else(|| panic!("{name}"))
+    }
+
+    #[test]
+    fn the_header_is_what_shaders_take_it_for() {
+        const WORK: &str = include_str!("../../../shaders/technique/lucid/work.wesl");
+        const CHUNKS: &str = include_str!("../../../shaders/technique/lucid/chunks.wesl");
+        const SORT: &str = include_str!("../../../shaders/technique/lucid/sort.wesl");
+        const CLASSES: &str = include_str!("../../../shaders/shared/classes.wesl");
+        for (name, offset) in [
+            ("RECORDS", offset_of!(Counts, records)),
+            ("PARTS", offset_of!(Counts, parts)),
+            ("LARGE", offset_of!(Counts, large)),
+            ("CLIPPED", offset_of!(Counts, clipped)),
+            ("PAIRS", offset_of!(Counts, pairs)),
+            ("CHUNKS", offset_of!(Counts, chunks)),
+            ("MERGE_LISTS", offset_of!(Counts, merge_lists)),
+            ("HALF_BLOCKS", offset_of!(Counts, half_blocks)),
+            ("ROOM", offset_of!(Header, room)),
+            ("FIRST", offset_of!(Header, first)),
+            ("LEVEL", offset_of!(Header, level)),
+            ("MERGES", offset_of!(Header, merges)),
+        ] {
+            assert_eq!(constant(WORK, name) * 4, offset as u64, "{name}");
+        }
+        assert_eq!((constant(WORK, "BLOCK"), constant(WORK, "BIN")), (BLOCK, BIN));
+        assert_eq!((constant(CHUNKS, "CHUNK"), constant(CHUNKS, "CHUNK_WORDS")), (1 << CHUNK_POWER, CHUNK_WORDS));
+        assert_eq!(constant(CHUNKS, "CHUNK_HEAD") + 2 * BLOCK * BLOCK, CHUNK_WORDS);
+        assert_eq!((constant(SORT, "FAN"), constant(SORT, "CHUNK_POWER")), (FAN, CHUNK_POWER));
+        assert_eq!(constant(SORT, "LEVELS"), LEVELS as u64);
+        assert_eq!(constant(CLASSES, "CLASSES"), WRONG_HEADER);
+    }
+
+    /// As [`pellucid_core::Technique::memory_formula`] says, but for what does not grow with anything.
+    #[test]
+    fn buffers_are_as_large_as_the_formula_says() {
+        let window = Window { left: 0, top: 0, width: 1920, height: 1080 };
+        let room = Counts { records: 1 << 20, parts: 1 << 21, ..Counts::default() };
+        let fragments = 5_000_000;
+        let bytes: u64 = needs(&room, fragments, window, 1).iter().map(|&(_, bytes)| bytes).sum();
+        let formula = 16.7 * window.pixels() as f64
+            + 64.0 * f64::from(room.records)
+            + 72.7 * f64::from(room.parts)
+            + 16.0 * fragments as f64;
+        let share = bytes as f64 / formula;
+        assert!((0.99..1.01).contains(&share), "{bytes} bytes, {share} of the formula");
+    }
 }
