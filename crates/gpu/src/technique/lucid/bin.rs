@@ -18,7 +18,8 @@ use crate::{Context, GpuError, shaders};
 pub(super) struct Bin {
     buffers: BindGroupLayout,
     find_bins: ComputePipeline,
-    cover_blocks: ComputePipeline,
+    /// Without and with pieces of clipped triangles.
+    cover_blocks: [ComputePipeline; 2],
     list_buffers: BindGroupLayout,
     list_parts: ComputePipeline,
     hide_buffers: BindGroupLayout,
@@ -39,7 +40,10 @@ impl Bin {
         let scatter = shader(gpu, "lists", shaders::LUCID_SCATTER);
         Self {
             find_bins: pipeline("bins", &bin, "find_bins", &buffers),
-            cover_blocks: pipeline("bins", &bin, "cover_blocks", &buffers),
+            cover_blocks: [0.0, 1.0].map(|has_folds| {
+                let layouts = [Some(&layouts.picture), None, None, Some(&buffers)];
+                compute_pipeline(gpu, "bins", &bin, "cover_blocks", &layouts, &[("has_folds", has_folds)])
+            }),
             list_parts: pipeline("lists", &scatter, "main", &list_buffers),
             buffers,
             list_buffers,
@@ -55,8 +59,13 @@ impl Bin {
     }
 
     /// What they cover of the bins' blocks.
-    pub(super) fn cover_blocks(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<(), GpuError> {
-        self.record_bins(frame, stage, &self.cover_blocks, Dispatch::Blocks)
+    pub(super) fn cover_blocks(
+        &self,
+        frame: &mut Frame<'_>,
+        stage: &Stage<'_>,
+        has_folds: bool,
+    ) -> Result<(), GpuError> {
+        self.record_bins(frame, stage, &self.cover_blocks[usize::from(has_folds)], Dispatch::Blocks)
     }
 
     fn record_bins(

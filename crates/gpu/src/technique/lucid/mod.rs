@@ -322,7 +322,7 @@ impl Lucid {
         self.dispatches(frame, &stage, "bins")?;
         self.bin.find_bins(frame, &stage)?;
         self.dispatches(frame, &stage, "bins")?;
-        self.bin.cover_blocks(frame, &stage)?;
+        self.bin.cover_blocks(frame, &stage, room.clipped > 0)?;
         self.sums(frame, window, &buffers.block_parts, work::blocks(window) + 1)?;
         self.dispatches(frame, &stage, "lists")?;
         self.bin.list_parts(frame, &stage)?;

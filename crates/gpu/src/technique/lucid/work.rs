@@ -212,7 +212,7 @@ pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -
         (FRAGMENTS, fragments * FRAGMENT_BYTES),
         (WRONG, (WRONG_HEADER + pixels) * 4),
         (DISPATCHES, Dispatch::COUNT * 12),
-        (DRAWS, draws * size_of::<DrawData>() as u64),
+        (DRAWS, draws.max(1) * size_of::<DrawData>() as u64),
     ];
     // Those of blocks take the same.
     needs.extend(PrefixSum::needs(pixels + 1));
