@@ -191,3 +191,36 @@ fn a_picture_of_33_million_pixels_is_whole() {
     let is_right = |pixel: &Vec4| (pixel.truncate() - expected).abs().max_element() < 1e-3;
     assert!(frame.image.pixels().iter().all(is_right), "{:?}", frame.image.pixels().iter().find(|p| !is_right(p)));
 }
+
+/// Twenty instances of a file of the folder in `PELLUCID_SCENES`, which is too large for the project: skipped with a notice where
+/// it is not there.
+#[test]
+fn twelve_million_triangles_agree_with_the_cpu() {
+    let path = std::env::var_os("PELLUCID_SCENES")
+        .map(|folder| std::path::Path::new(&folder).join("gltf/GearboxAssy/GearboxAssy.glb"))
+        .filter(|path| path.exists());
+    let Some(path) = path else {
+        return eprintln!("skipped: set PELLUCID_SCENES to a folder with gltf/GearboxAssy/GearboxAssy.glb");
+    };
+    let Some(gpu) = gpu(false) else { return };
+    let mut scene = pellucid::load_file(&path).unwrap().scene;
+    let sphere = scene.bounding_sphere();
+    let instances = scene.instances().to_vec();
+    for copy in 1..20 {
+        let place = Vec3::new((copy % 5) as f32, (copy / 5) as f32, 0.0) * sphere.radius;
+        for instance in &instances {
+            let world_from_mesh = Affine3A::from_translation(place) * instance.world_from_mesh;
+            scene.add_instance(Instance { world_from_mesh, ..*instance }).unwrap();
+        }
+    }
+    let view = View::of(&scene).size(640, 360).opacity(0.3);
+    let frame = render(&gpu, &scene, &view, Resolve::Blend);
+    let expected = Renderer::new().render(&scene, &view, Resolve::Blend).unwrap();
+    eprintln!("{:?}", frame.stats);
+    // Both snap to the same grid, but their transforms may round differently.
+    let [ours, theirs] = [&frame, &expected].map(|frame| frame.stats.fragments as f64);
+    assert!(frame.stats.triangles > 10_000_000 && (ours / theirs - 1.0).abs() < 1e-4, "{ours} of {theirs} fragments");
+    let pixels = frame.image.pixels().iter().zip(expected.image.pixels());
+    let differing = pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1.0 / 255.0).count();
+    assert!(differing * 1000 < frame.image.pixels().len(), "{differing} pixels differ");
+}

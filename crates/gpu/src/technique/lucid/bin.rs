@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::{Dispatch, VARIES};
+use super::work::{Dispatch, Shading};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
@@ -24,8 +24,8 @@ pub(super) struct Bin {
     list_parts: ComputePipeline,
     hide_buffers: BindGroupLayout,
     hide_module: ShaderModule,
-    /// By whether colours vary, and whether there is an alpha test.
-    hide: HashMap<(bool, bool), ComputePipeline>,
+    /// By what shading looks at, and whether there is an alpha test.
+    hide: HashMap<(Shading, bool), ComputePipeline>,
 }
 
 impl Bin {
@@ -121,10 +121,10 @@ impl Bin {
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let bindings = [(0, &buffers.work), (1, &buffers.records), (2, &buffers.parts), (3, &buffers.places)];
         let group = buffer_group(gpu, &self.hide_buffers, &bindings);
-        let pipeline = self.hide.entry((stage.varies, tests_alpha)).or_insert_with(|| {
+        let pipeline = self.hide.entry((stage.shading, tests_alpha)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.hide_buffers)];
-            let constants =
-                [(VARIES, f64::from(u8::from(stage.varies))), ("tests_alpha", f64::from(u8::from(tests_alpha)))];
+            let [varies, smooth, flat] = stage.shading.constants();
+            let constants = [varies, smooth, flat, ("tests_alpha", f64::from(u8::from(tests_alpha)))];
             compute_pipeline(gpu, "hide", &self.hide_module, "main", &layouts, &constants)
         });
         let mut pass = frame.compute_pass("hide")?;

@@ -6,7 +6,7 @@
 //! - `quads`: at load time triangles are paired, so that set-up transforms shared vertices once.
 //! - `setup`: one invocation a quad culls, transforms and snaps it to the pixel grid, and finds what small triangles cover of
 //!   their blocks of 8 x 8 pixels, in integers. What has to be clipped is listed for the host, as it takes f64 (`record`).
-//! - `bin`: large triangles find their bins of 32 x 32 pixels, shared out evenly over invocations, and in those their blocks.
+//! - `bin`: large triangles find their bins of 16 x 16 pixels, shared out evenly over invocations, and in those their blocks.
 //!   Then every block's parts of triangles are listed, behind each other, less what opaque surfaces hide.
 //! - `raster`: parts of a block are sorted by depth. Which of them cover each pixel is noted in bits, 32 parts at a time; then
 //!   each is shaded, and its fragments stored where their pixels have them next.
@@ -40,7 +40,7 @@ use wgpu::{BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStage
 
 use self::work::{
     BLOCK_PARTS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS, ORDERED, PARTS,
-    PLACES, RECORDS, WORK, WRONG,
+    PLACES, RECORDS, Shading, WORK, WRONG,
 };
 use super::growth::most_that_fits;
 use super::{Capture, Layouts, Outcome};
@@ -162,8 +162,7 @@ struct Stage<'a> {
     buffers: &'a Buffers,
     picture: BindGroup,
     scene: BindGroup,
-    /// Whether the colour of any transparent surface varies.
-    varies: bool,
+    shading: Shading,
 }
 
 impl Lucid {
@@ -299,7 +298,7 @@ impl Lucid {
             window,
             picture: self.picture_group(frame),
             scene: self.scene_group(frame, &all_draws),
-            varies: frame.surfaces.compute_draws().any(|draw| draw.varies),
+            shading: Shading::of(&frame.surfaces),
             buffers: &buffers,
         };
 

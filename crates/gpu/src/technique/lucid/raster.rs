@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::{Counts, Dispatch, Header, VARIES};
+use super::work::{Counts, Dispatch, Header, Shading};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
 use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
@@ -22,15 +22,15 @@ pub(super) struct Raster {
     sort_buffers: BindGroupLayout,
     sort_chunks: ComputePipeline,
     next_level: ComputePipeline,
-    merge_runs: ComputePipeline,
+    /// From the lists of parts, and to them.
+    merge_runs: [ComputePipeline; 2],
     cover_buffers: BindGroupLayout,
     mark: ComputePipeline,
     count_fragments: ComputePipeline,
     place_fragments: ComputePipeline,
     shade_buffers: BindGroupLayout,
     shade_module: ShaderModule,
-    /// By whether colours vary.
-    shade: HashMap<bool, ComputePipeline>,
+    shade: HashMap<Shading, ComputePipeline>,
 }
 
 impl Raster {
@@ -46,7 +46,10 @@ impl Raster {
         Self {
             sort_chunks: pipeline("sort", &sort, "sort_chunks", &sort_buffers),
             next_level: pipeline("sort", &sort, "next_level", &sort_buffers),
-            merge_runs: pipeline("sort", &sort, "merge_runs", &sort_buffers),
+            merge_runs: [1.0, 0.0].map(|in_lists| {
+                let layouts = [Some(&layouts.picture), None, None, Some(&sort_buffers)];
+                compute_pipeline(gpu, "sort", &sort, "merge_runs", &layouts, &[("in_lists", in_lists)])
+            }),
             sort_buffers,
             mark: pipeline("cover", &cover, "mark", &cover_buffers),
             count_fragments: pipeline("cover", &cover, "count_fragments", &cover_buffers),
@@ -70,10 +73,10 @@ impl Raster {
     pub(super) fn merge(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, header: &Header) -> Result<(), GpuError> {
         let merges = header.merges.into_iter().take_while(|&merges| merges > 0);
         let mut pass = self.sort_pass(frame, stage)?;
-        for count in merges {
+        for (count, merge_runs) in merges.zip(self.merge_runs.iter().cycle()) {
             pass.set_pipeline(&self.next_level);
             pass.dispatch_workgroups(1, 1, 1);
-            pass.set_pipeline(&self.merge_runs);
+            pass.set_pipeline(merge_runs);
             dispatch(&mut pass, u64::from(count).div_ceil(LANES));
         }
         Ok(())
@@ -122,10 +125,9 @@ impl Raster {
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let bindings = [(1, &buffers.records), (6, &buffers.chunks), (7, &buffers.ordered), (9, fragments)];
         let group = buffer_group(gpu, &self.shade_buffers, &bindings);
-        let pipeline = self.shade.entry(stage.varies).or_insert_with(|| {
+        let pipeline = self.shade.entry(stage.shading).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.shade_buffers)];
-            let constants = [(VARIES, f64::from(u8::from(stage.varies)))];
-            compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &constants)
+            compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &stage.shading.constants())
         });
         let mut pass = frame.compute_pass("shade")?;
         pass.set_pipeline(pipeline);

@@ -3,14 +3,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::gpu_data::DrawData;
+use crate::gpu_data::{DrawData, flags};
 use crate::memory::Window;
 use crate::pass::ordered::OrderedPasses;
 use crate::pass::prefix_sum::PrefixSum;
+use crate::surface::Surfaces;
 
 /// Pixels along a side of a block, and of a bin.
 pub(super) const BLOCK: u64 = 8;
-pub(super) const BIN: u64 = 32;
+pub(super) const BIN: u64 = 16;
 
 /// Parts of a chunk, as a power of two, and runs that are merged at a time, likewise; levels of merges. Twins:
 /// `shaders/technique/lucid/{chunks,sort}.wesl`.
@@ -21,10 +22,39 @@ pub(super) const LEVELS: usize = 7;
 /// Words of a chunk. Twin: `CHUNK_WORDS`.
 const CHUNK_WORDS: u64 = 133;
 
-/// Constants of shaders by their numbers, as names of imported modules change when they are linked: `varies` in
-/// `shaders/technique/lucid/shade.wesl`, `filter_size` in `filter.wesl`.
-pub(super) const VARIES: &str = "1";
+/// The constant `filter_size` of `shaders/technique/lucid/filter.wesl` by its number, as names of imported modules change when
+/// they are linked.
 pub(super) const FILTER_SIZE: &str = "2";
+
+/// What has to be looked at to shade the transparent surfaces of a view. Twins: constants of
+/// `shaders/technique/lucid/shade.wesl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(super) struct Shading {
+    /// Whether the colour of any varies.
+    pub(super) varies: bool,
+    /// Whether any has normals at its vertices.
+    pub(super) has_smooth: bool,
+    /// Whether any has not.
+    pub(super) has_flat: bool,
+}
+
+impl Shading {
+    pub(super) fn of(surfaces: &Surfaces<'_>) -> Self {
+        surfaces.compute_draws().fold(Self::default(), |all, draw| {
+            let is_smooth = surfaces.data[draw.instance].flags & flags::HAS_NORMALS != 0;
+            Self {
+                varies: all.varies || draw.varies,
+                has_smooth: all.has_smooth || is_smooth,
+                has_flat: all.has_flat || !is_smooth,
+            }
+        })
+    }
+
+    /// Constants by their numbers.
+    pub(super) fn constants(self) -> [(&'static str, f64); 3] {
+        [("1", self.varies), ("3", self.has_smooth), ("4", self.has_flat)].map(|(id, is)| (id, f64::from(u8::from(is))))
+    }
+}
 
 pub(super) const WORK: &str = "work";
 pub(super) const RECORDS: &str = "triangles";
