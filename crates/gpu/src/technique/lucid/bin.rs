@@ -6,8 +6,9 @@ use std::collections::HashMap;
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
-use super::work::{Dispatch, Shading};
+use super::work::{Dispatch, Shading, blocks};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
+use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::shader;
@@ -21,6 +22,7 @@ pub(super) struct Bin {
     /// Without and with pieces of clipped triangles.
     cover_blocks: [ComputePipeline; 2],
     list_buffers: BindGroupLayout,
+    count_chunks: ComputePipeline,
     list_parts: ComputePipeline,
     hide_buffers: BindGroupLayout,
     hide_module: ShaderModule,
@@ -31,7 +33,7 @@ pub(super) struct Bin {
 impl Bin {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
         let buffers = buffers_layout(gpu, &[0, 1, 2, 3, 4].map(|binding| (binding, false)));
-        let list_buffers = buffers_layout(gpu, &[0, 2, 3, 4, 5, 6].map(|binding| (binding, false)));
+        let list_buffers = buffers_layout(gpu, &[0, 2, 3, 4, 5, 6, 9].map(|binding| (binding, false)));
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -44,6 +46,7 @@ impl Bin {
                 let layouts = [Some(&layouts.picture), None, None, Some(&buffers)];
                 compute_pipeline(gpu, "bins", &bin, "cover_blocks", &layouts, &[("has_folds", has_folds)])
             }),
+            count_chunks: pipeline("lists", &scatter, "count_chunks", &list_buffers),
             list_parts: pipeline("lists", &scatter, "main", &list_buffers),
             buffers,
             list_buffers,
@@ -87,8 +90,23 @@ impl Bin {
         Ok(())
     }
 
-    /// Lists of every block's parts, once it is known how many come before each.
+    /// How many chunks each block's parts make, once it is known how many come before each.
+    pub(super) fn count_chunks(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<(), GpuError> {
+        let mut pass = self.list_pass(frame, stage)?;
+        pass.set_pipeline(&self.count_chunks);
+        dispatch(&mut pass, (blocks(stage.window) + 1).div_ceil(LANES));
+        Ok(())
+    }
+
+    /// Lists of every block's parts, once it is known how many chunks come before each, too.
     pub(super) fn list_parts(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<(), GpuError> {
+        let mut pass = self.list_pass(frame, stage)?;
+        pass.set_pipeline(&self.list_parts);
+        pass.dispatch_workgroups_indirect(&stage.buffers.dispatches, Dispatch::Parts.offset());
+        Ok(())
+    }
+
+    fn list_pass(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<wgpu::ComputePass<'static>, GpuError> {
         let buffers = stage.buffers;
         let bindings = [
             (0, &buffers.work),
@@ -97,14 +115,13 @@ impl Bin {
             (4, &buffers.block_parts),
             (5, &buffers.lists),
             (6, &buffers.chunks),
+            (9, &buffers.chunk_sums),
         ];
         let group = buffer_group(frame.gpu, &self.list_buffers, &bindings);
         let mut pass = frame.compute_pass("lists")?;
-        pass.set_pipeline(&self.list_parts);
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
-        pass.dispatch_workgroups_indirect(&buffers.dispatches, Dispatch::Parts.offset());
-        Ok(())
+        Ok(pass)
     }
 
     /// What lies behind opaque surfaces or fails an alpha test, if there are any.

@@ -39,8 +39,8 @@ use pellucid_core::{Resolve, Scene};
 use wgpu::{BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages};
 
 use self::work::{
-    BLOCK_PARTS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS, ORDERED, PARTS,
-    PLACES, RECORDS, Shading, WORK, WRONG,
+    BLOCK_PARTS, CHUNK_SUMS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS,
+    ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
 };
 use super::growth::most_that_fits;
 use super::{Capture, Layouts, Outcome};
@@ -138,6 +138,7 @@ struct Buffers {
     block_parts: wgpu::Buffer,
     lists: wgpu::Buffer,
     chunks: wgpu::Buffer,
+    chunk_sums: wgpu::Buffer,
     ordered: wgpu::Buffer,
     offsets: wgpu::Buffer,
     wrong: wgpu::Buffer,
@@ -285,6 +286,7 @@ impl Lucid {
             block_parts: buffer(BLOCK_PARTS)?,
             lists: buffer(LISTS)?,
             chunks: buffer(CHUNKS)?,
+            chunk_sums: buffer(CHUNK_SUMS)?,
             ordered: buffer(ORDERED)?,
             offsets: buffer(OFFSETS)?,
             wrong: buffer(WRONG)?,
@@ -323,6 +325,8 @@ impl Lucid {
         self.dispatches(frame, &stage, "bins")?;
         self.bin.cover_blocks(frame, &stage, room.clipped > 0)?;
         self.sums(frame, window, &buffers.block_parts, work::blocks(window) + 1)?;
+        self.bin.count_chunks(frame, &stage)?;
+        self.sums(frame, window, &buffers.chunk_sums, work::blocks(window) + 1)?;
         self.dispatches(frame, &stage, "lists")?;
         self.bin.list_parts(frame, &stage)?;
         self.bin.hide(frame, &stage, &self.layouts)?;

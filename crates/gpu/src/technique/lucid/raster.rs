@@ -36,7 +36,7 @@ pub(super) struct Raster {
 impl Raster {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
         let sort_buffers = buffers_layout(gpu, &[0, 2, 3, 5, 6, 7].map(|binding| (binding, false)));
-        let cover_buffers = buffers_layout(gpu, &[(4, true), (6, false), (7, true), (8, false)]);
+        let cover_buffers = buffers_layout(gpu, &[(6, false), (7, true), (8, false), (9, true)]);
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -145,7 +145,7 @@ impl Raster {
         step: &'static str,
     ) -> Result<wgpu::ComputePass<'static>, GpuError> {
         let buffers = stage.buffers;
-        let bindings = [(4, &buffers.block_parts), (6, &buffers.chunks), (7, &buffers.ordered), (8, &buffers.offsets)];
+        let bindings = [(6, &buffers.chunks), (7, &buffers.ordered), (8, &buffers.offsets), (9, &buffers.chunk_sums)];
         let group = buffer_group(frame.gpu, &self.cover_buffers, &bindings);
         let mut pass = frame.compute_pass(step)?;
         pass.set_bind_group(0, &stage.picture, &[]);
