@@ -26,8 +26,8 @@ pub(super) struct Bin {
     list_parts: ComputePipeline,
     hide_buffers: BindGroupLayout,
     hide_module: ShaderModule,
-    /// By what shading looks at, and whether there is an alpha test.
-    hide: HashMap<(Shading, bool), ComputePipeline>,
+    /// By what shading looks at, whether there are opaque surfaces, and whether there is an alpha test.
+    hide: HashMap<(Shading, bool, bool), ComputePipeline>,
 }
 
 impl Bin {
@@ -132,16 +132,18 @@ impl Bin {
         layouts: &OwnLayouts,
     ) -> Result<(), GpuError> {
         let tests_alpha = frame.surfaces.has_cutoff(Pass::Transparent);
-        if frame.surfaces.count(Pass::Opaque) == 0 && !tests_alpha {
+        let tests_depth = frame.surfaces.count(Pass::Opaque) > 0;
+        if !tests_depth && !tests_alpha {
             return Ok(());
         }
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let bindings = [(0, &buffers.work), (1, &buffers.records), (2, &buffers.parts), (3, &buffers.places)];
         let group = buffer_group(gpu, &self.hide_buffers, &bindings);
-        let pipeline = self.hide.entry((stage.shading, tests_alpha)).or_insert_with(|| {
+        let pipeline = self.hide.entry((stage.shading, tests_depth, tests_alpha)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.hide_buffers)];
             let [varies, smooth, flat] = stage.shading.constants();
-            let constants = [varies, smooth, flat, ("tests_alpha", f64::from(u8::from(tests_alpha)))];
+            let [depth, alpha] = [tests_depth, tests_alpha].map(|tests| f64::from(u8::from(tests)));
+            let constants = [varies, smooth, flat, ("tests_depth", depth), ("tests_alpha", alpha)];
             compute_pipeline(gpu, "hide", &self.hide_module, "main", &layouts, &constants)
         });
         let mut pass = frame.compute_pass("hide")?;
