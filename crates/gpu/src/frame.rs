@@ -1,5 +1,6 @@
 //! One frame in the making: the per-frame half of everything.
 
+use glam::Vec4;
 use pellucid_core::fbuffer::Size;
 use pellucid_core::{Layers, Resolve, Scene, View};
 use wgpu::{TextureFormat, TextureUsages, TextureView};
@@ -106,6 +107,8 @@ pub(crate) struct Frame<'a> {
     /// Share of quads with one triangle.
     pub(crate) lone_share: f64,
     pub(crate) frame_data: wgpu::Buffer,
+    /// Whether [`Self::clear_picture`] has been recorded.
+    picture_is_clear: bool,
     encoder: Option<wgpu::CommandEncoder>,
 }
 
@@ -149,6 +152,7 @@ impl<'a> Frame<'a> {
             half_block_parts: 0,
             lone_share: 0.0,
             frame_data,
+            picture_is_clear: false,
             encoder: None,
         }
     }
@@ -223,11 +227,30 @@ impl<'a> Frame<'a> {
         step: &'static str,
         window: Window,
     ) -> Result<wgpu::RenderPass<'static>, GpuError> {
+        self.pass_into_picture(step, window, wgpu::LoadOp::Load)
+    }
+
+    /// Clears the picture as a step of its own: once, before anything is in a window of it.
+    pub(crate) fn clear_picture(&mut self, step: &'static str, value: Vec4) -> Result<(), GpuError> {
+        if std::mem::replace(&mut self.picture_is_clear, true) {
+            return Ok(());
+        }
+        let [r, g, b, a] = value.to_array().map(f64::from);
+        let whole = Window { left: 0, top: 0, width: self.view.width, height: self.view.height };
+        self.pass_into_picture(step, whole, wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a })).map(drop)
+    }
+
+    fn pass_into_picture(
+        &mut self,
+        step: &'static str,
+        window: Window,
+        load: wgpu::LoadOp<wgpu::Color>,
+    ) -> Result<wgpu::RenderPass<'static>, GpuError> {
         let color = wgpu::RenderPassColorAttachment {
             view: &self.targets.picture_view,
             depth_slice: None,
             resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
         };
         self.begin_render_pass(step, window, &[Some(color)], None)
     }

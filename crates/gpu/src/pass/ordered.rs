@@ -1,7 +1,7 @@
 //! From a captured LFB to ordered fragments to the picture, the same for every technique that is an LFB. Twins:
 //! `shaders/pass/{classify,sort,resolve}.wesl`, linked with the technique's own module.
 //!
-//! Step "empty pixels" draws what pixels without any become, over the whole window. Step "classify" lists runs of 64 pixels
+//! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step "classify" lists runs of 64 pixels
 //! by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
 //! the way to the resolve, in "read and blend", up to 8, 16 or 32 fragments are sorted in registers by networks
 //! (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
@@ -14,7 +14,9 @@
 
 use std::collections::HashMap;
 
+use glam::Vec4;
 use pellucid_core::Resolve;
+use pellucid_core::primitive::Pass;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, RenderPipeline, ShaderModule, ShaderStages};
 
 use crate::frame::{Frame, Goal};
@@ -159,7 +161,7 @@ impl OrderedPasses {
         Ok(())
     }
 
-    /// Draws what empty pixels become, and lists runs of pixels with fragments: by class, or all in the last.
+    /// Fills in what empty pixels become, and lists runs of pixels with fragments: by class, or all in the last.
     pub(crate) fn list(
         &mut self,
         frame: &mut Frame<'_>,
@@ -182,8 +184,7 @@ impl OrderedPasses {
         let (classes, prepared) = (bind_group(&runs), bind_group(&dispatches));
         let groups = [&frame.picture.bind_group.clone(), &classes, lfb];
 
-        let empty = self.empties.entry(code).or_insert_with(|| self.empty.pipeline(gpu, &[("resolve", code.into())]));
-        self.empty.record(frame, window, empty, None)?;
+        self.fill_empty_pixels(frame, window, code)?;
         frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
         let mut pass = frame.compute_pass("classify")?;
         set_groups(&mut pass, groups);
@@ -195,6 +196,17 @@ impl OrderedPasses {
         pass.dispatch_workgroups(1, 1, 1);
         drop(pass);
         Ok(Listed { classes, dispatches })
+    }
+
+    fn fill_empty_pixels(&mut self, frame: &mut Frame<'_>, window: Window, code: u32) -> Result<(), GpuError> {
+        if frame.surfaces.count(Pass::Opaque) == 0 {
+            let counts = matches!(frame.resolve, Resolve::Complexity(_));
+            return frame.clear_picture("empty pixels", if counts { Vec4::ZERO } else { frame.view.background });
+        }
+        let gpu = frame.gpu;
+        let pipeline =
+            self.empties.entry(code).or_insert_with(|| self.empty.pipeline(gpu, &[("resolve", code.into())]));
+        self.empty.record(frame, window, pipeline, None)
     }
 
     fn classify(&mut self, gpu: &Context, one_class: bool) -> &ComputePipeline {
