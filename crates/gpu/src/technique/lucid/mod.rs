@@ -24,6 +24,29 @@
 //! - Coverage is exact, and so is the order: pixels for which the filter was too small are found and mended, and equal depths
 //!   follow draw order. The depths that blocks are sorted by only decide how many have to be.
 //! - All buffers are as large as counters say; a window that overflows is repeated or split.
+//! - Subgroups are not used: no invocation waits for another but where set-up and bins allocate.
+//!
+//! Where time goes on llvmpipe with 2 cores, in milliseconds, with the whole of `linear` in the same run beside; 1280 x 720, from
+//! the front, opacity 0.3:
+//!
+//! | step | dragon | hair | bound by |
+//! |---|---|---|---|
+//! | set-up | 54 | 101 | four masks of 8 x 8 pixels and 12 coordinates a triangle, gathered lane by lane |
+//! | bins | 0 | 77 | edge functions of 64 bits for each block of a bin |
+//! | lists | 5 | 34 | stores all over the lists |
+//! | sort | 9 | 70 | loads and stores of merges; the networks take a third |
+//! | cover | 14 | 42 | an atomic for each fragment |
+//! | shade | 16 | 159 | cache misses: records, normals, and where fragments go. Arithmetic is a twentieth |
+//! | empty pixels, classify, sums | 8 | 8 | as in every LFB |
+//! | blend | 3 | 22 | reading fragments |
+//! | repair | 0 | 8 | sorting 8,215 pixels |
+//! | whole frame | 122 | 560 | |
+//! | `linear` | 251 | 647 | |
+//!
+//! The dragon has 871,414 triangles and 0.23 million fragments, hair 1,026,000 and 3.4 million. What did not help: sharing
+//! parts out so that neighbours shade as many samples; writing rows of masks out instead of looping over columns (little). What
+//! did: no local arrays in set-up (a third of it), bins of 16 pixels instead of 32 (half of bins), chunks in the order of
+//! blocks (40 % of shading).
 
 mod bin;
 mod blend;

@@ -68,7 +68,8 @@ fn scenes(name: &'static str, size: (u32, u32)) -> Series {
     let oak = file("oak_tree/oak_tree.glb", "@tree");
     let pine = file("scrub_pine/scrubPine.obj", "@tree:leaves=200");
     let teapot = file("utah_teapot/teapot.obj", "@teapot");
-    let [alpha, lucid, linear] = [Technique::Alpha, Technique::Lucid, Technique::Linear].map(Variant::of);
+    let [alpha, lucid, linear, cpu] =
+        [Technique::Alpha, Technique::Lucid, Technique::Linear, Technique::Cpu].map(Variant::of);
     Series {
         name,
         title: match name {
@@ -76,11 +77,11 @@ fn scenes(name: &'static str, size: (u32, u32)) -> Series {
             _ => "Scenes at 2560 x 1440",
         },
         about: "Every material's alpha times 0.5; Sponza with the camera inside. The depth filter holds 3 fragments of a pixel, \
-                8 or 12; with the threshold a pixel is left when less than 1/128 of the light gets through. linear is another \
-                exact technique. Wrong pixels are counted twice: those that leave the filter out of order, and those of the \
-                finished picture that differ from one of fragments that are all sorted.",
+                8 or 12; with the threshold a pixel is left when less than 1/128 of the light gets through. Wrong pixels are \
+                counted twice: those that leave the filter out of order, and those of the finished picture that differ from \
+                one of fragments that are all sorted.",
         axis: None,
-        variants: vec![alpha, lucid, Variant::filter(8), Variant::filter(12), Variant::leaving_early(), linear],
+        variants: vec![alpha, lucid, Variant::filter(8), Variant::filter(12), Variant::leaving_early(), linear, cpu],
         points: vec![
             point("boxes", built_in("@boxes:n=10"), 1.4e6, 12_000.0, 20.0),
             point("teapot", teapot, 0.3e6, 16_000.0, 8.0),
