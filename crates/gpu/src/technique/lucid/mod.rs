@@ -34,7 +34,7 @@
 //! | set-up | 54 | 101 | four masks of 8 x 8 pixels and 12 coordinates a triangle, gathered lane by lane |
 //! | bins | 0 | 77 | edge functions of 64 bits for each block of a bin |
 //! | lists | 5 | 34 | stores all over the lists |
-//! | sort | 9 | 70 | loads and stores of merges; the networks take a third |
+//! | sort | 9 | 70 | loads and stores of merges |
 //! | cover | 14 | 42 | an atomic for each fragment |
 //! | shade | 16 | 159 | cache misses: records, normals, and where fragments go. Arithmetic is a twentieth |
 //! | empty pixels, classify, sums | 8 | 8 | as in every LFB |
