@@ -31,12 +31,12 @@
 //!
 //! | step | dragon | hair | bound by |
 //! |---|---|---|---|
-//! | set-up | 54 | 101 | four masks of 8 x 8 pixels and 12 coordinates a triangle, gathered lane by lane |
+//! | set-up | 54 | 101 | masks of blocks, and stores of records, parts and their places, lane by lane |
 //! | bins | 0 | 77 | edge functions of 64 bits for each block of a bin |
 //! | lists | 5 | 34 | stores all over the lists |
 //! | sort | 9 | 70 | loads and stores of merges |
 //! | cover | 14 | 42 | an atomic for each fragment |
-//! | shade | 16 | 159 | cache misses: records, normals, and where fragments go. Arithmetic is a twentieth |
+//! | shade | 16 | 159 | cache misses: records, normals, and where fragments go; arithmetic is a fifth |
 //! | empty pixels, classify, sums | 8 | 8 | as in every LFB |
 //! | blend | 3 | 22 | reading fragments |
 //! | repair | 0 | 8 | sorting 8,215 pixels |
