@@ -50,6 +50,7 @@
 
 mod bin;
 mod blend;
+mod layouts;
 mod quads;
 mod raster;
 mod record;
@@ -59,8 +60,9 @@ mod work;
 use std::collections::HashMap;
 
 use pellucid_core::{Resolve, Scene};
-use wgpu::{BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline};
 
+use self::layouts::{OwnLayouts, buffer_group, buffers_layout};
 use self::work::{
     BLOCK_PARTS, CHUNK_SUMS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS,
     ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
@@ -72,7 +74,7 @@ use crate::memory::Window;
 use crate::pass::ordered::{LfbShaders, OrderedPasses, compute_pipeline};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
-use crate::surface::{shader, storage_entry};
+use crate::surface::shader;
 use crate::upload::SceneUpload;
 use crate::{Context, GpuError, shaders};
 
@@ -123,17 +125,6 @@ pub(crate) struct Lucid {
     lfb: BindGroupLayout,
     scene: Option<LoadedScene>,
     learned: HashMap<Window, Learned>,
-}
-
-/// Bind group layouts that stages share. Group 3 of each is the buffers it works on, by the numbers of their bindings.
-#[derive(Debug)]
-struct OwnLayouts {
-    /// Group 0: frame, opaque surfaces and picture, without the figures.
-    picture: BindGroupLayout,
-    /// Group 1: the scene with all draws.
-    scene: BindGroupLayout,
-    dispatches: BindGroupLayout,
-    work: BindGroupLayout,
 }
 
 /// What is made of a scene when it is loaded.
@@ -191,48 +182,7 @@ struct Stage<'a> {
 
 impl Lucid {
     pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
-        let compute = ShaderStages::COMPUTE;
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None };
-        let texture =
-            |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
-        let uniform = BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let stored = BindingType::StorageTexture {
-            access: wgpu::StorageTextureAccess::WriteOnly,
-            format: wgpu::TextureFormat::Rgba32Float,
-            view_dimension: wgpu::TextureViewDimension::D2,
-        };
-        let layout = |label, entries: &[_]| {
-            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
-        };
-        let (flat, pages) = (wgpu::TextureViewDimension::D2, wgpu::TextureViewDimension::D2Array);
-        let texels = wgpu::TextureSampleType::Float { filterable: false };
-        let own = OwnLayouts {
-            picture: layout(
-                "picture",
-                &[
-                    entry(0, uniform),
-                    entry(1, texture(texels, flat)),
-                    entry(2, texture(wgpu::TextureSampleType::Depth, flat)),
-                    entry(3, stored),
-                ],
-            ),
-            scene: layout(
-                "scene and draws",
-                &[
-                    storage_entry(0, compute, true),
-                    storage_entry(1, compute, true),
-                    storage_entry(2, compute, true),
-                    storage_entry(3, compute, true),
-                    entry(4, texture(texels, pages)),
-                ],
-            ),
-            dispatches: layout("dispatches", &[storage_entry(0, compute, false)]),
-            work: buffers_layout(gpu, &[(0, false)]),
-        };
+        let own = OwnLayouts::new(gpu);
         let module = shader(gpu, "dispatches", shaders::LUCID_DISPATCH);
         let groups = [None, None, Some(&own.dispatches), Some(&own.work)];
         let lfb = blend::lfb_layout(gpu);
@@ -319,17 +269,17 @@ impl Lucid {
         frame.submit()?;
         gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room)));
         gpu.queue.write_buffer(&all_draws, 0, bytemuck::cast_slice(&frame.surfaces.data));
+        let Some(scene) = &self.scene else { unreachable!("it was loaded") };
         let stage = Stage {
             window,
-            picture: self.picture_group(frame),
-            scene: self.scene_group(frame, &all_draws),
+            picture: self.layouts.picture_group(frame),
+            scene: self.layouts.scene_group(frame, &all_draws, &scene.atlas),
             shading: Shading::of(&frame.surfaces),
             buffers: &buffers,
         };
 
         frame.zero("zero", &buffers.block_parts, buffers.block_parts.size())?;
         frame.zero("zero", &buffers.chunks, buffers.chunks.size())?;
-        let Some(scene) = &self.scene else { unreachable!("it was loaded") };
         self.setup.record(frame, &stage, &scene.quads)?;
         if room.clipped > 0 {
             let header: Header = read_buffer(frame, &buffers.work, 0, 1)?[0];
@@ -414,30 +364,6 @@ impl Lucid {
         pass.set_bind_group(2, &buffer_group(gpu, &self.layouts.dispatches, &[(0, &stage.buffers.dispatches)]), &[]);
         pass.set_bind_group(3, &buffer_group(gpu, &self.layouts.work, &[(0, &stage.buffers.work)]), &[]);
     }
-
-    fn picture_group(&self, frame: &Frame<'_>) -> BindGroup {
-        let (view, targets) = (wgpu::BindingResource::TextureView, frame.targets);
-        let resources = [
-            frame.frame_data.as_entire_binding(),
-            view(&targets.opaque_color_view),
-            view(&targets.opaque_depth_view),
-            view(&targets.picture_view),
-        ];
-        group(frame.gpu, &self.layouts.picture, resources)
-    }
-
-    fn scene_group(&self, frame: &Frame<'_>, draws: &wgpu::Buffer) -> BindGroup {
-        let Some(scene) = &self.scene else { unreachable!("it was loaded") };
-        let [positions, attributes, indices] = &frame.surfaces.scene().buffers;
-        let resources = [
-            positions.as_entire_binding(),
-            attributes.as_entire_binding(),
-            indices.as_entire_binding(),
-            draws.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&scene.atlas),
-        ];
-        group(frame.gpu, &self.layouts.scene, resources)
-    }
 }
 
 impl Capture for Lucid {
@@ -512,29 +438,4 @@ impl Capture for Lucid {
             }
         }
     }
-}
-
-/// A layout of buffers by their bindings, each read only or not.
-fn buffers_layout(gpu: &Context, bindings: &[(u32, bool)]) -> BindGroupLayout {
-    let entries: Vec<_> =
-        bindings.iter().map(|&(binding, read_only)| storage_entry(binding, ShaderStages::COMPUTE, read_only)).collect();
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
-}
-
-fn buffer_group(gpu: &Context, layout: &BindGroupLayout, buffers: &[(u32, &wgpu::Buffer)]) -> BindGroup {
-    let entries: Vec<_> = buffers
-        .iter()
-        .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
-}
-
-fn group<const N: usize>(
-    gpu: &Context,
-    layout: &BindGroupLayout,
-    resources: [wgpu::BindingResource<'_>; N],
-) -> BindGroup {
-    let entries: Vec<_> =
-        (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
 }
