@@ -8,6 +8,10 @@
 //! As in the article, fragments are kept in memory or in an array of textures. In memory they lie layer by layer too, so
 //! that neighbouring pixels write side by side. WebGPU's floor cannot read and write one texture in a pass: from textures
 //! a table of layer numbers is sorted, 4 bytes more for each place. Rejected: a second array of textures to sort into.
+//!
+//! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear): main render 65 (bunny), 71
+//! (dragon), 69 (hair), 82 (Sponza), which is drawn again for each of the windows that deep pixels make necessary: 2 on the
+//! dragon, 16 on hair and Sponza; greatest count 1 to 7; read and blend 2 to 9.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{

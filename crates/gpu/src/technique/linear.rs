@@ -4,6 +4,20 @@
 //! The offset table is summed in place, as in the chapter, and captured into in place: where a pixel's fragments start
 //! becomes where they end. Unlike the chapter's it is not padded to a power of two, and has one entry more, in which the
 //! total appears.
+//!
+//! **Where the time goes**, in percent of a frame of 1280 x 720 on llvmpipe, two cores (suite `peers` of the benchmark; the
+//! rest of 100 is opaque surfaces, zero, empty pixels, classify and the host):
+//!
+//! |               | bunny | dragon | hair | Sponza |
+//! |---|---|---|---|---|
+//! | count render   | 35 | 39 | 31 | 14 |
+//! | prefix sums    |  5 |  2 |  1 |  1 |
+//! | main render    | 41 | 50 | 51 | 76 |
+//! | sort           |  0 |  0 |  5 |  0 |
+//! | read and blend |  5 |  2 |  8 |  6 |
+//!
+//! Meshes of small triangles are transformed and set up twice, which costs more than their fragments; where textures are
+//! read (Sponza), the second pass does nearly all, and this technique is the fastest of all that are exact.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};

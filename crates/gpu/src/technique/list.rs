@@ -8,6 +8,18 @@
 //! Beside its head pointer each pixel counts its fragments, which the chapter does not: one atomic addition more for a
 //! fragment, next to the word that is exchanged anyway. Rejected: to walk the list for its length, in every pass anew. The
 //! count also goes on when there is no room left, so that a window that has to be split is split where it must be, at once.
+//!
+//! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear):
+//!
+//! |               | bunny | dragon | hair | Sponza |
+//! |---|---|---|---|---|
+//! | main render    | 73 | 87 | 65 | 82 |
+//! | sort           |  0 |  0 |  8 |  0 |
+//! | read and blend |  8 |  4 | 22 | 16 |
+//! | empty pixels   |  6 |  2 |  1 |  1 |
+//!
+//! One pass over the geometry makes it the fastest exact technique on bunny, dragon and hair, by 1.2 to 1.7 over `linear`; its links
+//! make reading two to three times as long. On the bunny a tenth of the frame is two threads taking turns at the counter.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};

@@ -13,6 +13,9 @@
 //! Rejected: to give the page up, which leaks it; to count first and find the page by walking, which is quadratic.
 //!
 //! How many pages a capture takes thus depends on timing a little; what is in them, once sorted, does not.
+//!
+//! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear): main render 77 (bunny), 89
+//! (dragon), 62 (hair), 77 (Sponza); sort 14 and read and blend 20 on hair, and 4 to 11 elsewhere. About as fast as `list`.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};
