@@ -18,7 +18,7 @@ use std::{env, fs};
 
 use wesl::{CompileOptions, FileResolver, ModulePath, ResolveError, Resolver, Wesl};
 
-/// Takes `package::shared::networks` from `build/networks.rs`, and `package::lfb` for another module; and if that is not a technique, what the renderer's own passes know of frame,
+/// Takes `package::shared::networks` and `part_network` from `build/networks.rs`, and `package::lfb` for another module; and if that is not a technique, what the renderer's own passes know of frame,
 /// picture and fragment for that module too.
 struct LfbResolver {
     files: FileResolver,
@@ -44,6 +44,9 @@ impl Resolver for LfbResolver {
     fn resolve_source<'a>(&'a self, path: &ModulePath) -> Result<Cow<'a, str>, ResolveError> {
         if path.components == ["shared", "networks"] {
             return Ok(networks::module().into());
+        }
+        if path.components == ["shared", "part_network"] {
+            return Ok(networks::part_module().into());
         }
         self.files.resolve_source(self.real(path))
     }
@@ -84,6 +87,22 @@ fn main() {
                 linked.insert(name, compile(&path("pass", stem), Some(path("technique", technique)), &features));
             }
         }
+    }
+    for stem in ["setup", "bin", "scatter", "dispatch", "sort", "cover"] {
+        linked.insert(format!("LUCID_{}", stem.to_uppercase()), link("technique::lucid", stem));
+    }
+    // Those that shade know all draws at once, and only read what was set up.
+    for stem in ["raster", "hide"] {
+        let features = [("all_draws", true), ("read_only", true)];
+        let linked_text = compile(&path("technique::lucid", stem), None, &features);
+        linked.insert(format!("LUCID_{}", stem.to_uppercase()), linked_text);
+    }
+    // From there on its fragments are those of a linearized LFB; what the filter left out of order is listed pixel by pixel.
+    let lfb = || Some(path("technique", "linear"));
+    linked.insert("LUCID_BLEND".to_owned(), compile(&path("technique::lucid", "blend"), lfb(), &[]));
+    for (name, stem) in [("LUCID_SORT_WRONG", "sort"), ("LUCID_RESOLVE_WRONG", "resolve")] {
+        let features = [("random_access", true), ("by_key", false), ("sorts", true), ("by_pixel", true)];
+        linked.insert(name.to_owned(), compile(&path("pass", stem), lfb(), &features));
     }
     for stem in ["raster", "shade", "collect", "sort", "output", "last"] {
         linked.insert(format!("FBUFFER_{}", stem.to_uppercase()), link("fbuffer", stem));

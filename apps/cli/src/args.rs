@@ -306,6 +306,16 @@ pub(crate) struct CaptureArgs {
     #[arg(long, value_name = "SIDE", allow_hyphen_values = true)]
     pub(crate) fbuffer: Option<String>,
 
+    /// Fragments of a pixel that lucid lets wait for nearer ones, from 1 to 12: with more of them, fewer pixels have to be
+    /// rendered again. The picture is the same at any [default: 3]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) filter_size: Option<String>,
+
+    /// Let lucid leave pixels through which less than this share of light gets, from 0 to 1: faster, and not exact above 0
+    /// [default: 0]
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
+    pub(crate) alpha_threshold: Option<String>,
+
     /// Write all sorted fragments back before they are resolved (linear, list, pages, abuffer): pays only where they are
     /// read more than once
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! Which techniques run here, and the renderer that runs them one after the other.
 
 use pellucid::core::fbuffer::Size;
-use pellucid::gpu::{ContextOptions, GpuError, GpuRenderer, Storage};
+use pellucid::gpu::{ContextOptions, DepthFilter, GpuError, GpuRenderer, Storage};
 use pellucid::{Renderer, Technique};
 
 use crate::UsageError;
@@ -25,6 +25,7 @@ pub(crate) struct GpuOptions {
     pub(crate) max_layers: Option<u32>,
     pub(crate) presort: bool,
     pub(crate) fbuffer_size: Option<Size>,
+    pub(crate) depth_filter: DepthFilter,
 }
 
 /// A renderer for all of some techniques.
@@ -90,9 +91,9 @@ impl DevicePlan {
                     if let Some(budget_bytes) = self.budget_bytes {
                         gpu = gpu.budget_bytes(budget_bytes);
                     }
-                    let GpuOptions { storage, max_layers, presort, fbuffer_size } = self.gpu;
-                    renderer = renderer
-                        .gpu(gpu.storage(storage).max_layers(max_layers).presort(presort).fbuffer_size(fbuffer_size));
+                    let GpuOptions { storage, max_layers, presort, fbuffer_size, depth_filter } = self.gpu;
+                    let gpu = gpu.storage(storage).max_layers(max_layers).presort(presort);
+                    renderer = renderer.gpu(gpu.fbuffer_size(fbuffer_size).depth_filter(depth_filter));
                 }
                 Err(error @ (GpuError::NoAdapter | GpuError::OnlySoftware { .. })) if !asked_for => {
                     techniques.retain(|technique| !on_gpu(technique));

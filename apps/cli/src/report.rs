@@ -39,6 +39,9 @@ pub(crate) struct Figures {
     windows: u32,
     rerenders: u32,
     cut_pixels: u64,
+    repaired_pixels: u64,
+    half_block_parts: u64,
+    lone_share: f64,
 }
 
 /// A timed part of a frame.
@@ -110,6 +113,9 @@ impl From<&Stats> for Figures {
             windows: stats.windows,
             rerenders: stats.rerenders,
             cut_pixels: stats.cut_pixels,
+            repaired_pixels: stats.repaired_pixels,
+            half_block_parts: stats.half_block_parts,
+            lone_share: stats.lone_share,
         }
     }
 }

@@ -54,6 +54,13 @@ pub(crate) fn opacity(text: &str) -> Result<f32, Wrong> {
         .ok_or_else(|| "not an opacity; it must be a number from 0 (invisible) to 1 (as the materials are)".into())
 }
 
+/// A share of a whole.
+pub(crate) fn share(text: &str) -> Result<f32, Wrong> {
+    number(text)
+        .filter(|share| (0.0..=1.0).contains(share))
+        .ok_or_else(|| "not a share; it must be a number from 0 to 1".into())
+}
+
 /// A whole number in a range, both ends included.
 pub(crate) fn whole(text: &str, least: u32, greatest: u32) -> Result<u32, Wrong> {
     let number = digits(text).then(|| text.parse().ok()).flatten();

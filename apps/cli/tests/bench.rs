@@ -48,7 +48,7 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
     assert_eq!((&report["schema"], &report["command"]), (&1.into(), &"bench".into()));
     assert_eq!((&report["complete"], &report["plan"]["quick"]), (&true.into(), &true.into()));
     let suites: Vec<&str> = report["suites"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
-    assert_eq!(suites, ["lfb", "peel", "abuffer", "fbuffer", "scale", "peers"]);
+    assert_eq!(suites, ["lfb", "peel", "abuffer", "fbuffer", "lucid", "scale", "peers"]);
     let points = points(&report);
     assert!(points.len() > 20);
     for point in &points {
@@ -70,7 +70,9 @@ fn every_suite_says_what_it_will_do_and_leaves_figures_and_a_page() {
     }
     assert!(outcome.stdout.contains("--backend cpu leaves the GPU out"), "{}", outcome.stdout);
     // The published figures stand beside, with what they were measured on.
-    for hardware in ["GeForce GTX 460", "GeForce GTX 660 Ti", "GeForce GTX 480", "ATI Radeon X800 series"] {
+    for hardware in
+        ["GeForce GTX 460", "GeForce GTX 660 Ti", "GeForce GTX 480", "ATI Radeon X800 series", "GeForce GTX 3050 Ti"]
+    {
         assert!(outcome.stdout.contains(&format!("; {hardware}")), "{hardware}");
     }
 
@@ -105,6 +107,31 @@ fn a_software_gpu_is_measured_if_asked_for_and_told_apart_from_exact() {
     assert_eq!((&buffers["storage"], &textures["storage"]), (&"buffer".into(), &"texture".into()));
     // A fragment takes 20 bytes in textures, 16 in buffers.
     assert!(textures["peak_bytes"].as_u64() > buffers["peak_bytes"].as_u64());
+}
+
+#[test]
+fn a_depth_filter_leaves_wrong_pixels_that_the_finished_picture_has_not() {
+    if std::env::var("PELLUCID_REQUIRE_GPU").as_deref() != Ok("1") {
+        return eprintln!("skipped: set PELLUCID_REQUIRE_GPU=1 to test on this machine's GPU, or a software one");
+    }
+    let work = Workplace::new();
+    let outcome = work.succeed("bench --suite lucid --quick --backend gpu -o out");
+    for part in ["Samples of a triangle in a half-block", "Wrong pixels: ", "Time over that of alpha"] {
+        assert!(outcome.stdout.contains(part), "{part}: {}", outcome.stdout);
+    }
+    let report = json(&work, "out");
+    let mut filters = 0;
+    for result in points(&report).iter().flat_map(|point| point["results"].as_array().unwrap()) {
+        let has_filter = result["technique"] == "lucid";
+        assert_eq!((result["filter_size"].is_u64(), result["repaired_pixels"].is_u64()), (has_filter, has_filter));
+        if has_filter && result["alpha_threshold"] == 0.0 {
+            assert_eq!((&result["wrong_pixels"], &result["exact"]), (&0.into(), &true.into()), "{result}");
+            assert!(result["half_block_parts"].as_u64().unwrap() > 0);
+            filters += 1;
+        }
+    }
+    // Three sizes at two points of two series.
+    assert_eq!(filters, 12);
 }
 
 #[test]

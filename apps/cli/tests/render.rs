@@ -151,6 +151,9 @@ fn figures_have_every_key_of_the_schema() {
         "windows",
         "rerenders",
         "cut_pixels",
+        "repaired_pixels",
+        "half_block_parts",
+        "lone_share",
         "exact",
     ];
     schema.sort_unstable();

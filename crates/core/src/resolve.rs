@@ -35,22 +35,26 @@ pub enum Resolve {
         /// Fragments at which the scale ends.
         u32,
     ),
+    /// Blended, with those pixels in red that the technique's depth filter alone left out of order: none for techniques
+    /// without one.
+    Errors,
 }
 
 impl Resolve {
     /// Names, as on the command line, with what they are.
-    pub const NAMES: [(&str, &str); 6] = [
+    pub const NAMES: [(&str, &str); 7] = [
         ("blend", "layers blended front to back"),
         ("blend:corrected", "blended, each layer's alpha corrected by the thickness of its solid"),
         ("gelly", "absorption by the thickness between surfaces"),
         ("nearest", "the nearest layer alone"),
         ("layer:N", "the N-th layer alone, 1 is the nearest"),
         ("complexity", "heat map of the number of fragments; complexity:N fixes the scale"),
+        ("errors", "blended; in red, pixels that the depth filter of lucid alone leaves out of order"),
     ];
 
     /// Whether fragments behind an almost opaque front still matter: whether the resolve looks at every layer.
     pub fn needs_all_layers(self) -> bool {
-        !matches!(self, Self::Blend | Self::Nearest)
+        !matches!(self, Self::Blend | Self::Nearest | Self::Errors)
     }
 }
 
@@ -64,6 +68,7 @@ impl fmt::Display for Resolve {
             Self::Layer(number) => write!(f, "layer:{number}"),
             Self::Complexity(0) => f.write_str("complexity"),
             Self::Complexity(full_scale) => write!(f, "complexity:{full_scale}"),
+            Self::Errors => f.write_str("errors"),
         }
     }
 }
@@ -79,6 +84,7 @@ impl FromStr for Resolve {
                 "gelly" => Some(Self::Gelly),
                 "nearest" => Some(Self::Nearest),
                 "complexity" => Some(Self::Complexity(0)),
+                "errors" => Some(Self::Errors),
                 _ => None,
             },
             Some(("blend", "corrected")) => Some(Self::BlendCorrected),
@@ -115,7 +121,7 @@ impl PixelResolver {
         let behind = opaque.map_or(self.background, |surface| surface.color);
         let mut composite = Composite::default();
         match self.resolve {
-            Resolve::Blend => {
+            Resolve::Blend | Resolve::Errors => {
                 for fragment in fragments {
                     composite.under(fragment.color);
                 }
@@ -259,7 +265,8 @@ mod tests {
 
     #[test]
     fn names_and_values_survive_the_round_trip() {
-        for name in ["blend", "blend:corrected", "gelly", "nearest", "layer:3", "complexity", "complexity:8"] {
+        for name in ["blend", "blend:corrected", "gelly", "nearest", "layer:3", "complexity", "complexity:8", "errors"]
+        {
             assert_eq!(name.parse::<Resolve>().unwrap().to_string(), name);
         }
         for name in ["", "layer", "layer:0", "layer:-1", "layer:x", "blend:", "complexity:0", "gelly:2", "Blend"] {

@@ -42,10 +42,18 @@ pub struct Stats {
     pub windows: u32,
     /// Captures repeated because an estimate of their size was too small.
     pub rerenders: u32,
-    /// Pixels with more layers than the frame was allowed to peel: the picture is not exact there.
+    /// Pixels with more layers than the frame was allowed to peel, or left early as too little light gets through: the picture
+    /// is not exact there.
     pub cut_pixels: u64,
     /// Windows of slots that an F-Buffer slid over, in all parts of the screen; 0 for other techniques.
     pub slot_windows: u64,
+    /// Pixels that a depth filter left out of order, and that were rendered again; 0 for techniques without.
+    pub repaired_pixels: u64,
+    /// Parts of triangles in half-blocks of 8 x 4 pixels, which a rasterizer in compute sorts by depth; 0 for other techniques.
+    pub half_block_parts: u64,
+    /// Share of triangles' pairs that have one triangle only, as none was left that would make a quad with it; 0 for
+    /// techniques that do not pair them.
+    pub lone_share: f64,
 }
 
 impl Stats {
@@ -68,6 +76,9 @@ impl Stats {
             rerenders: 0,
             cut_pixels: 0,
             slot_windows: 0,
+            repaired_pixels: 0,
+            half_block_parts: 0,
+            lone_share: 0.0,
         }
     }
 

@@ -26,11 +26,14 @@ pub enum Technique {
     Pages,
     /// A slot for every fragment in rasterization order, sorted into blending order (Houston, Preetham and Segal 2005).
     FBuffer,
+    /// A rasterizer in compute shaders: covered parts of blocks sorted by depth, then a filter for each pixel, and pixels
+    /// where that was not enough once more (LucidRaster, Jakubowski 2025).
+    Lucid,
 }
 
 impl Technique {
     /// All there are.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Cpu,
         Self::Oracle,
         Self::Alpha,
@@ -40,6 +43,7 @@ impl Technique {
         Self::ABuffer,
         Self::Pages,
         Self::FBuffer,
+        Self::Lucid,
     ];
 
     /// The name on the command line.
@@ -54,6 +58,7 @@ impl Technique {
             Self::ABuffer => "abuffer",
             Self::Pages => "pages",
             Self::FBuffer => "fbuffer",
+            Self::Lucid => "lucid",
         }
     }
 
@@ -61,7 +66,14 @@ impl Technique {
     pub fn backend(self) -> &'static str {
         match self {
             Self::Cpu | Self::Oracle => "cpu",
-            Self::Alpha | Self::Peel | Self::Linear | Self::List | Self::ABuffer | Self::Pages | Self::FBuffer => "gpu",
+            Self::Alpha
+            | Self::Peel
+            | Self::Linear
+            | Self::List
+            | Self::ABuffer
+            | Self::Pages
+            | Self::FBuffer
+            | Self::Lucid => "gpu",
         }
     }
 
@@ -75,7 +87,8 @@ impl Technique {
             | Self::List
             | Self::ABuffer
             | Self::Pages
-            | Self::FBuffer => true,
+            | Self::FBuffer
+            | Self::Lucid => true,
             Self::Alpha => false,
         }
     }
@@ -83,7 +96,7 @@ impl Technique {
     /// Passes over the geometry.
     pub fn passes(self) -> &'static str {
         match self {
-            Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer | Self::Pages => "1",
+            Self::Cpu | Self::Oracle | Self::Alpha | Self::List | Self::ABuffer | Self::Pages | Self::Lucid => "1",
             Self::Peel => "layers + 1",
             Self::Linear => "2",
             Self::FBuffer => "windows",
@@ -106,6 +119,9 @@ impl Technique {
             Self::FBuffer => {
                 "8 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
             }
+            Self::Lucid => {
+                "16.9 B x pixels + 64 B x visible triangles + 73 B x their parts in blocks of 8 x 8 pixels + 16 B x fragments"
+            }
         }
     }
 
@@ -121,6 +137,9 @@ impl Technique {
             Self::ABuffer => "captures into arrays, one for each pixel, all as long; repeats it if they were too short",
             Self::FBuffer => {
                 "gives every fragment a slot in rasterization order, then sorts them all into blending order"
+            }
+            Self::Lucid => {
+                "rasterizes in compute, sorts parts of triangles block by block, and pixels where that was not enough"
             }
             Self::Pages => {
                 "links pages of fragments of each pixel, in one pass; repeats it if there was too little room"

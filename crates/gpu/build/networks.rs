@@ -68,6 +68,39 @@ fn write_sort(text: &mut String, size: usize) -> std::fmt::Result {
     writeln!(text, "    return slot;\n}}")
 }
 
+/// The module `package::shared::part_network`: a chunk of the parts of a block, put in order.
+pub(crate) fn part_module() -> String {
+    let mut text = String::from(
+        "import package::technique::lucid::order::{Item, is_before, load_listed, store_listed};
+
+// Leaves the nearer of two in the first.
+fn order(a: ptr<function, Item>, b: ptr<function, Item>) {
+    let first = *a;
+    let second = *b;
+    let swaps = is_before(second, first);
+    *a = select(first, second, swaps);
+    *b = select(second, first, swaps);
+}
+
+// Up to 32 parts from a place of the lists on.
+fn sort_run(first: u32, count: u32, is_last: bool) {
+",
+    );
+    let size = SIZES[SIZES.len() - 1];
+    let mut write = |line: String| writeln!(text, "{line}").expect("strings take all");
+    for i in 0..size {
+        write(format!("    var f{i}: Item;\n    if {i}u < count {{ f{i} = load_listed(first + {i}u); }}"));
+    }
+    for (a, b) in exchanges(size) {
+        write(format!("    order(&f{a}, &f{b});"));
+    }
+    for i in 0..size {
+        write(format!("    if {i}u < count {{ store_listed(first + {i}u, f{i}, is_last); }}"));
+    }
+    text.push_str("}\n");
+    text
+}
+
 fn write_network(text: &mut String, size: usize, load: &str) -> std::fmt::Result {
     writeln!(text, "    var slot = first;")?;
     for i in 0..size {

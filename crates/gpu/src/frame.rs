@@ -10,6 +10,7 @@ use crate::memory::{Memory, Window};
 use crate::pass::picture::PictureGroup;
 use crate::steps::Steps;
 use crate::surface::Surfaces;
+use crate::technique::DepthFilter;
 use crate::{Context, GpuError};
 
 /// Format of [`Targets::picture`].
@@ -97,6 +98,14 @@ pub(crate) struct Frame<'a> {
     pub(crate) fbuffer_size: Option<Size>,
     /// Windows of slots so far.
     pub(crate) slot_windows: u64,
+    /// How the rasterizer in compute blends.
+    pub(crate) depth_filter: DepthFilter,
+    /// Pixels that its depth filter left out of order, and that were rendered again.
+    pub(crate) repaired_pixels: u64,
+    /// Parts of triangles in half-blocks.
+    pub(crate) half_block_parts: u64,
+    /// Share of quads with one triangle.
+    pub(crate) lone_share: f64,
     pub(crate) frame_data: wgpu::Buffer,
     /// Whether [`Self::clear_picture`] has been recorded.
     picture_is_clear: bool,
@@ -138,6 +147,10 @@ impl<'a> Frame<'a> {
             cut_pixels: 0,
             fbuffer_size: None,
             slot_windows: 0,
+            depth_filter: DepthFilter::default(),
+            repaired_pixels: 0,
+            half_block_parts: 0,
+            lone_share: 0.0,
             frame_data,
             picture_is_clear: false,
             encoder: None,

@@ -102,8 +102,23 @@ pub struct DrawData {
     pub texture_size: [u32; 2],
     /// Number of the instance.
     pub number: u32,
+    /// Where its texture lies in the atlas of all.
+    pub atlas: AtlasPlace,
     /// Ends on a multiple of 16 bytes.
-    pub padding: u32,
+    pub padding: [u32; 2],
+}
+
+/// Where a texture lies in the atlas of all textures, in which techniques that shade all draws together find them. Twin: the
+/// last three members of `DrawData` in `shaders/shared/mesh.wesl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct AtlasPlace {
+    /// Column of the full size, and row from bit 16 on.
+    pub full_size: u32,
+    /// The same of the smaller levels.
+    pub smaller: u32,
+    /// Page of the full size, and that of the smaller levels from bit 16 on.
+    pub pages: u32,
 }
 
 /// Bits of [`DrawData::flags`], as in `shaders/shared/mesh.wesl`.
@@ -120,6 +135,10 @@ pub mod flags {
     pub const HAS_COLORS: u32 = 32;
     /// Has a texture.
     pub const HAS_TEXTURE: u32 = 64;
+    /// Back faces are left out.
+    pub const CULLS_BACK: u32 = 128;
+    /// Front faces run clockwise.
+    pub const MIRRORED: u32 = 256;
 }
 
 /// Where a mesh's data lie in the buffers of its scene.
@@ -133,14 +152,16 @@ pub(crate) struct MeshPlaces {
 }
 
 impl DrawData {
-    pub(crate) fn new(draw: &Draw<'_>, number: u32, places: &MeshPlaces) -> Self {
+    pub(crate) fn new(draw: &Draw<'_>, number: u32, places: &MeshPlaces, atlas: AtlasPlace) -> Self {
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let flags = bit(draw.lit, flags::LIT)
             | bit(draw.mesh.normals().is_some(), flags::HAS_NORMALS)
             | bit(draw.blends, flags::BLENDS)
             | bit(draw.cutoff.is_some(), flags::HAS_CUTOFF)
             | bit(draw.mesh.colors().is_some(), flags::HAS_COLORS)
-            | bit(draw.texture.is_some(), flags::HAS_TEXTURE);
+            | bit(draw.texture.is_some(), flags::HAS_TEXTURE)
+            | bit(draw.culls_back_faces, flags::CULLS_BACK)
+            | bit(draw.mirrored, flags::MIRRORED);
         let normal = draw.view_from_normal;
         let (transform, sampling) = draw
             .texture
@@ -167,7 +188,8 @@ impl DrawData {
                 .texture
                 .map_or([0; 2], |(texture, _)| [texture.levels()[0].width, texture.levels()[0].height]),
             number,
-            padding: 0,
+            atlas,
+            padding: [0; 2],
         }
     }
 }

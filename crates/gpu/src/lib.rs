@@ -33,5 +33,5 @@ pub use error::GpuError;
 pub use pass::picture::Totals;
 pub use pass::prefix_sum::PrefixSumData;
 pub use renderer::{DEFAULT_BUDGET_BYTES, GpuRenderer};
-pub use technique::Storage;
+pub use technique::{DepthFilter, Storage};
 pub use wgpu;

@@ -10,7 +10,7 @@ use crate::technique::Outcome;
 use crate::{Context, GpuError};
 
 /// A rectangle of pixels of the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Window {
     /// Column of its leftmost pixel.
     pub left: u32,

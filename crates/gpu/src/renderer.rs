@@ -16,7 +16,7 @@ use crate::pass::opaque::OpaquePass;
 use crate::pass::picture::{self, PictureGroup, Totals};
 use crate::readback::{read_buffer, read_texture};
 use crate::surface::{DrawGroups, SurfaceLayouts, Surfaces};
-use crate::technique::{self, Capture, Layouts, Outcome, Storage};
+use crate::technique::{self, Capture, DepthFilter, Layouts, Outcome, Storage};
 use crate::upload::SceneUpload;
 use crate::{Context, ContextOptions, GpuError};
 
@@ -33,6 +33,7 @@ pub struct GpuRenderer {
     max_layers: Option<u32>,
     presort: bool,
     fbuffer_size: Option<Size>,
+    depth_filter: DepthFilter,
     storage: Storage,
     kept: Mutex<Kept>,
 }
@@ -84,6 +85,7 @@ impl GpuRenderer {
             max_layers: None,
             presort: false,
             fbuffer_size: None,
+            depth_filter: DepthFilter::default(),
             storage: Storage::default(),
             kept: Mutex::new(kept),
         })
@@ -117,6 +119,14 @@ impl GpuRenderer {
     #[must_use]
     pub fn fbuffer_size(mut self, size: Option<Size>) -> Self {
         self.fbuffer_size = size;
+        self
+    }
+
+    /// The same renderer with another depth filter, through which the technique `lucid` blends. The picture is the same with
+    /// a filter of any size, as pixels that it leaves out of order are rendered again.
+    #[must_use]
+    pub fn depth_filter(mut self, depth_filter: DepthFilter) -> Self {
+        self.depth_filter = depth_filter;
         self
     }
 
@@ -221,6 +231,7 @@ impl GpuRenderer {
         };
         let capture = techniques.iter_mut().find(|(name, _)| *name == technique).map(|(_, capture)| capture);
         let Some(capture) = capture else { unreachable!("it has just been made") };
+        capture.load(gpu, scene, upload)?;
 
         let start = Instant::now();
         let instances = scene.instances().len();
@@ -234,6 +245,7 @@ impl GpuRenderer {
         frame.max_layers = self.max_layers;
         frame.presort = self.presort;
         frame.fbuffer_size = self.fbuffer_size;
+        frame.depth_filter = self.depth_filter;
 
         let whole = Window { left: 0, top: 0, width: view.width, height: view.height };
         frame.set_window(whole)?;
@@ -272,6 +284,9 @@ impl GpuRenderer {
         stats.rerenders = frame.rerenders;
         stats.cut_pixels = frame.cut_pixels;
         stats.slot_windows = frame.slot_windows;
+        stats.repaired_pixels = frame.repaired_pixels;
+        stats.half_block_parts = frame.half_block_parts;
+        stats.lone_share = frame.lone_share;
         stats.peak_bytes = frame.memory.peak_bytes();
         let layers = match std::mem::replace(&mut frame.goal, Goal::Picture) {
             Goal::Picture => Vec::new(),

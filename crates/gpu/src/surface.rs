@@ -50,6 +50,8 @@ pub(crate) struct Surfaces<'a> {
     scene: &'a SceneUpload,
     layouts: &'a SurfaceLayouts,
     groups: &'a DrawGroups,
+    /// Of all instances, as the shaders know them.
+    pub(crate) data: Vec<DrawData>,
     pub(crate) dropped_triangles: u64,
 }
 
@@ -88,6 +90,7 @@ struct DrawCommand<'a> {
 /// A draw, for passes in compute over its fragments.
 pub(crate) struct ComputeDraw<'a> {
     pub(crate) instance: usize,
+    pub(crate) mesh: usize,
     pub(crate) varies: bool,
     /// Groups 0 and 2.
     pub(crate) frame_group: &'a BindGroup,
@@ -198,6 +201,7 @@ impl<'a> Surfaces<'a> {
         let core_draws = draws(scene, view)?;
         let mut bytes = vec![0; stride * core_draws.len().max(1)];
         let mut dropped_triangles = 0;
+        let mut all_data = Vec::with_capacity(core_draws.len());
         let surface_draws = (core_draws.iter().zip(scene.instances()).zip(bytes.chunks_exact_mut(stride)).enumerate())
             .map(|(i, ((draw, instance), bytes))| {
                 let mesh = &upload.meshes[instance.mesh.index()];
@@ -205,7 +209,9 @@ impl<'a> Surfaces<'a> {
                 if may_overflow {
                     dropped_triangles += count_dropped(draw);
                 }
-                let data = DrawData::new(draw, i as u32, &mesh.places);
+                let atlas = draw.texture.map(|(_, texture)| upload.atlas.places[texture.texture.index()]);
+                let data = DrawData::new(draw, i as u32, &mesh.places, atlas.unwrap_or_default());
+                all_data.push(data);
                 bytes[..size_of::<DrawData>()].copy_from_slice(bytemuck::bytes_of(&data));
                 SurfaceDraw {
                     pass: draw.pass,
@@ -225,7 +231,7 @@ impl<'a> Surfaces<'a> {
             })
             .collect();
         gpu.queue.write_buffer(&groups.instances, 0, &bytes);
-        Ok(Self { draws: surface_draws, scene: upload, layouts, groups, dropped_triangles })
+        Ok(Self { draws: surface_draws, scene: upload, layouts, groups, data: all_data, dropped_triangles })
     }
 
     /// Group 1.
@@ -233,10 +239,16 @@ impl<'a> Surfaces<'a> {
         &self.scene.bind_group
     }
 
+    /// What is kept of the scene.
+    pub(crate) fn scene(&self) -> &'a SceneUpload {
+        self.scene
+    }
+
     /// All draws of transparent surfaces, in draw order.
     pub(crate) fn compute_draws(&self) -> impl Iterator<Item = ComputeDraw<'_>> {
         self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).map(|draw| ComputeDraw {
             instance: draw.instance,
+            mesh: draw.mesh,
             varies: draw.varies,
             frame_group: &self.groups.transparent[draw.instance],
             texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
@@ -246,6 +258,11 @@ impl<'a> Surfaces<'a> {
     /// How many draws a part of the frame takes.
     pub(crate) fn count(&self, pass: Pass) -> usize {
         self.draws.iter().filter(|draw| draw.pass == pass).count()
+    }
+
+    /// Whether any draw of a part of the frame has to pass an alpha test.
+    pub(crate) fn has_cutoff(&self, pass: Pass) -> bool {
+        self.draws.iter().any(|draw| draw.pass == pass && draw.has_cutoff)
     }
 
     /// What a recording of transparent surfaces depends on.

@@ -1,6 +1,7 @@
 //! A scene on the GPU: corners and indices of each mesh to draw it, all meshes in three storage buffers for what shaders
 //! have to know of whole triangles, textures with the mip levels of the core. Kept while the scene's revision stays the same.
 
+pub(crate) mod atlas;
 pub(crate) mod corners;
 
 use glam::Vec3;
@@ -8,6 +9,7 @@ use pellucid_core::texture::MipLevel;
 use pellucid_core::{Scene, Texture};
 use wgpu::{BindGroup, BufferUsages, TextureUsages};
 
+use self::atlas::AtlasLayout;
 use self::corners::Corners;
 use crate::gpu_data::MeshPlaces;
 use crate::surface::SurfaceLayouts;
@@ -32,6 +34,10 @@ pub(crate) struct SceneUpload {
     pub(crate) meshes: Vec<MeshUpload>,
     pub(crate) bind_group: BindGroup,
     pub(crate) textures: Vec<BindGroup>,
+    /// Positions, attributes and indices, as in `bind_group`.
+    pub(crate) buffers: [wgpu::Buffer; 3],
+    /// Where textures would lie in an atlas.
+    pub(crate) atlas: AtlasLayout,
 }
 
 impl SceneUpload {
@@ -80,7 +86,8 @@ impl SceneUpload {
             .map(|texture| Ok(layouts.texture_bind_group(gpu, &upload_texture(gpu, texture)?)))
             .collect::<Result<_, GpuError>>()?;
         gpu.check()?;
-        Ok(Self { revision: scene.revision(), meshes, bind_group, textures })
+        let atlas = AtlasLayout::of(scene.textures());
+        Ok(Self { revision: scene.revision(), meshes, bind_group, textures, buffers, atlas })
     }
 }
 

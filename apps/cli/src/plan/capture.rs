@@ -1,6 +1,6 @@
 //! With what a picture is rendered.
 
-use pellucid::gpu::Storage;
+use pellucid::gpu::{DepthFilter, Storage};
 use pellucid::{Renderer, Technique};
 
 use super::multi_pass::side;
@@ -38,6 +38,14 @@ impl CapturePlan {
         only_for("--storage", args.storage.is_some(), technique, &[Technique::ABuffer])?;
         let fbuffer_size = optional("--fbuffer", args.fbuffer.as_ref(), side)?;
         only_for("--fbuffer", fbuffer_size.is_some() && !is_multi_pass, technique, &[Technique::FBuffer])?;
+        let filter_sizes = |text: &str| values::whole(text, 1, DepthFilter::GREATEST_SIZE);
+        let filter_size = optional("--filter-size", args.filter_size.as_ref(), filter_sizes)?;
+        let threshold = optional("--alpha-threshold", args.alpha_threshold.as_ref(), values::share)?;
+        only_for("--filter-size", filter_size.is_some(), technique, &[Technique::Lucid])?;
+        only_for("--alpha-threshold", threshold.is_some(), technique, &[Technique::Lucid])?;
+        let usual = DepthFilter::default();
+        let depth_filter =
+            DepthFilter { size: filter_size.unwrap_or(usual.size), threshold: threshold.unwrap_or(usual.threshold) };
         only_for("--presort", args.presort, technique, &lists)?;
         let storage = match args.storage {
             None | Some(StorageArg::Buffer) => Storage::Buffer,
@@ -48,6 +56,7 @@ impl CapturePlan {
             max_layers,
             presort: args.presort,
             fbuffer_size,
+            depth_filter,
         });
         device.check("--technique", technique.as_slice())?;
         Ok(Self { technique, device })

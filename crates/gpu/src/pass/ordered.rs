@@ -53,6 +53,19 @@ pub(crate) struct LfbShaders {
     pub(crate) gather: &'static str,
 }
 
+/// Runs of pixels with fragments.
+pub(crate) struct Listed {
+    /// Group 1 of passes over them.
+    pub(crate) classes: BindGroup,
+    /// One for each class.
+    pub(crate) dispatches: wgpu::Buffer,
+}
+
+impl Listed {
+    /// Where the dispatch of the last class is.
+    pub(crate) const MANY: u64 = (CLASSES - 1) * DISPATCH_BYTES;
+}
+
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct OrderedPasses {
@@ -101,6 +114,11 @@ impl OrderedPasses {
         }
     }
 
+    /// The layout of [`Listed::classes`].
+    pub(crate) fn classes_layout(&self) -> &BindGroupLayout {
+        &self.buffer
+    }
+
     /// All buffers it takes for so many pixels, with their bytes.
     pub(crate) fn needs(pixels: u64) -> [(&'static str, u64); 2] {
         [(RUNS, CLASSES * (1 + pixels.div_ceil(RUN_PX)) * 4), (DISPATCHES, CLASSES * DISPATCH_BYTES)]
@@ -113,32 +131,9 @@ impl OrderedPasses {
         let wants_layers = matches!(frame.goal, Goal::Layers(_));
         let needs_order = wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
         let sorts_all = wants_layers || frame.presort || self.sort.is_none();
-        let one_class = sorts_all || !needs_order;
-
-        let [(_, runs_bytes), (_, dispatches_bytes)] = Self::needs(window.pixels());
-        let runs = frame.memory.buffer(gpu, RUNS, runs_bytes)?;
-        let dispatches = frame.memory.buffer(gpu, DISPATCHES, dispatches_bytes)?;
-        let bind_group = |buffer: &wgpu::Buffer| {
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("classes"),
-                layout: &self.buffer,
-                entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
-            })
-        };
-        let (classes, prepared) = (bind_group(&runs), bind_group(&dispatches));
-        let groups = [&frame.picture.bind_group.clone(), &classes, lfb];
-
-        self.fill_empty_pixels(frame, window, code)?;
-        frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
-        let mut pass = frame.compute_pass("classify")?;
-        set_groups(&mut pass, groups);
-        pass.set_pipeline(self.classify(gpu, one_class));
-        let workgroups = window.pixels().div_ceil(RUN_PX * GROUP_RUNS);
-        pass.dispatch_workgroups(workgroups.min(GRID_WIDTH) as u32, workgroups.div_ceil(GRID_WIDTH) as u32, 1);
-        pass.set_pipeline(&self.prepare);
-        pass.set_bind_group(2, &prepared, &[]);
-        pass.dispatch_workgroups(1, 1, 1);
-        drop(pass);
+        let listed = self.list(frame, window, lfb, sorts_all || !needs_order)?;
+        let groups = [&frame.picture.bind_group.clone(), &listed.classes, lfb];
+        let dispatches = listed.dispatches;
 
         let class = |number: u64| number * DISPATCH_BYTES;
         let [few, some, more, blocks, many] = [0, 1, 2, 3, 4].map(class);
@@ -164,6 +159,43 @@ impl OrderedPasses {
             self.gather.read(frame, window, lfb)?;
         }
         Ok(())
+    }
+
+    /// Fills in what empty pixels become, and lists runs of pixels with fragments: by class, or all in the last.
+    pub(crate) fn list(
+        &mut self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        lfb: &BindGroup,
+        one_class: bool,
+    ) -> Result<Listed, GpuError> {
+        let gpu = frame.gpu;
+        let code = resolve_code(frame.resolve);
+        let [(_, runs_bytes), (_, dispatches_bytes)] = Self::needs(window.pixels());
+        let runs = frame.memory.buffer(gpu, RUNS, runs_bytes)?;
+        let dispatches = frame.memory.buffer(gpu, DISPATCHES, dispatches_bytes)?;
+        let bind_group = |buffer: &wgpu::Buffer| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("classes"),
+                layout: &self.buffer,
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+            })
+        };
+        let (classes, prepared) = (bind_group(&runs), bind_group(&dispatches));
+        let groups = [&frame.picture.bind_group.clone(), &classes, lfb];
+
+        self.fill_empty_pixels(frame, window, code)?;
+        frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
+        let mut pass = frame.compute_pass("classify")?;
+        set_groups(&mut pass, groups);
+        pass.set_pipeline(self.classify(gpu, one_class));
+        let workgroups = window.pixels().div_ceil(RUN_PX * GROUP_RUNS);
+        pass.dispatch_workgroups(workgroups.min(GRID_WIDTH) as u32, workgroups.div_ceil(GRID_WIDTH) as u32, 1);
+        pass.set_pipeline(&self.prepare);
+        pass.set_bind_group(2, &prepared, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        drop(pass);
+        Ok(Listed { classes, dispatches })
     }
 
     fn fill_empty_pixels(&mut self, frame: &mut Frame<'_>, window: Window, code: u32) -> Result<(), GpuError> {
@@ -205,7 +237,8 @@ fn set_groups(pass: &mut wgpu::ComputePass<'_>, [picture, classes, lfb]: [&BindG
 /// Number of a resolve in `shaders/shared/resolve.wesl`.
 pub(crate) fn resolve_code(resolve: Resolve) -> u32 {
     match resolve {
-        Resolve::Blend => 0,
+        // Only a depth filter makes errors, and shows them itself.
+        Resolve::Blend | Resolve::Errors => 0,
         Resolve::BlendCorrected => 1,
         Resolve::Gelly => 2,
         Resolve::Nearest => 3,

@@ -9,16 +9,19 @@ mod fbuffer;
 mod growth;
 mod linear;
 mod list;
+mod lucid;
 mod pages;
 mod peel;
 
 pub use abuffer::Storage;
-use pellucid_core::Technique;
+pub use lucid::DepthFilter;
+use pellucid_core::{Scene, Technique};
 use wgpu::BindGroupLayout;
 
 use crate::frame::Frame;
 use crate::memory::Window;
 use crate::surface::SurfaceLayouts;
+use crate::upload::SceneUpload;
 use crate::{Context, GpuError};
 
 /// What became of a window.
@@ -32,6 +35,11 @@ pub(crate) enum Outcome {
 
 /// A way to capture and order fragments, on the GPU.
 pub(crate) trait Capture: std::fmt::Debug + Send {
+    /// Takes what it needs of a scene beside what all techniques do, if it has not yet.
+    fn load(&mut self, _gpu: &Context, _scene: &Scene, _upload: &SceneUpload) -> Result<(), GpuError> {
+        Ok(())
+    }
+
     /// Captures the transparent fragments of a window in front of the opaque surfaces, orders them, and records or runs
     /// everything up to the frame's goal. The frame is already aimed at the window.
     fn window(&mut self, frame: &mut Frame<'_>, window: Window) -> Result<Outcome, GpuError>;
@@ -59,6 +67,7 @@ pub(crate) fn new(
         Technique::ABuffer => Ok(Box::new(abuffer::ABuffer::new(gpu, layouts, storage))),
         Technique::List => Ok(Box::new(list::List::new(gpu, layouts))),
         Technique::FBuffer => Ok(Box::new(fbuffer::FBuffer::new(gpu, layouts))),
+        Technique::Lucid => Ok(Box::new(lucid::Lucid::new(gpu, layouts))),
         Technique::Peel => Ok(Box::new(peel::Peel::new(gpu, layouts))),
         Technique::Cpu | Technique::Oracle => Err(GpuError::NotOnGpu(technique)),
     }

@@ -104,6 +104,8 @@ fn exhibit(chapter: &Chapter, show: Show) -> Vec<Exhibit> {
         Show::Memory => vec![bytes(chapter)],
         Show::UnitCosts => unit_costs(chapter),
         Show::Cuts => cuts(chapter),
+        Show::HalfBlocks => half_blocks(chapter),
+        Show::Wrong => wrong(chapter),
         Show::Exponents => exponents(chapter),
         Show::Speedups => speedups(chapter),
         Show::Peers => peers(chapter),
@@ -179,12 +181,18 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 16] = [
+const STEP_ORDER: [&str; 24] = [
     "transform",
     "clip, setup and bin",
     "raster, sort, shade and resolve",
     "geometry",
     "opaque",
+    "set-up",
+    "bins",
+    "lists",
+    "hide",
+    "cover",
+    "shade",
     "passes",
     "blend",
     "compose",
@@ -195,7 +203,9 @@ const STEP_ORDER: [&str; 16] = [
     "greatest count",
     "gather",
     "sort",
+    "classify",
     "read and blend",
+    "repair",
 ];
 
 fn sort_shares(chapter: &Chapter) -> Vec<Exhibit> {
@@ -244,6 +254,42 @@ fn cuts(chapter: &Chapter) -> Vec<Exhibit> {
         (false, 0) => "unsorted".to_owned(),
     };
     vec![Exhibit { title: "Pixels where layers were cut off".into(), table: chapter.matrix(cell), plot: None }]
+}
+
+fn half_blocks(chapter: &Chapter) -> Vec<Exhibit> {
+    let mut table = vec![heading("point", ["fragments", "parts of triangles", "samples a part"].map(str::to_owned))];
+    for point in &chapter.results {
+        let parts = point.results.iter().filter_map(|result| result.figures()?.half_block_parts).next();
+        if let (Some(fragments), Some(parts)) = (point.fragments, parts) {
+            let samples = format!("{:.2}", fragments as f64 / parts.max(1) as f64);
+            table.push(heading(&point.label, [short_count(fragments), short_count(parts), samples]));
+        }
+    }
+    let title = "Samples of a triangle in a half-block of 8 x 4 pixels".into();
+    if table.len() < 2 { Vec::new() } else { vec![Exhibit { title, table, plot: None }] }
+}
+
+/// Of variants with a depth filter: pixels that it leaves out of order, before they are mended and after.
+fn wrong(chapter: &Chapter) -> Vec<Exhibit> {
+    let has_filter = |name: &String| {
+        let mut figures = chapter.results.iter().filter_map(|point| point.figures(name));
+        figures.any(|figures| figures.repaired_pixels.is_some())
+    };
+    let names: Vec<String> = chapter.names().into_iter().filter(has_filter).collect();
+    let mut table = vec![heading("point", names.iter().map(|name| format!("{name}: before, after")))];
+    for point in &chapter.results {
+        let pixels = f64::from(point.width) * f64::from(point.height);
+        let cell = |name: &String| {
+            let counts = point.figures(name).and_then(|figures| figures.repaired_pixels.zip(figures.wrong_pixels));
+            counts.map_or_else(none, |(before, after)| {
+                let percent = 100.0 * before as f64 / pixels;
+                format!("{} ({percent:.3} %), {}", full_count(before), full_count(after))
+            })
+        };
+        table.push(heading(&point.label, names.iter().map(cell)));
+    }
+    let title = "Wrong pixels: out of order after the depth filter, and in the finished picture".into();
+    if names.is_empty() { Vec::new() } else { vec![Exhibit { title, table, plot: None }] }
 }
 
 fn exponents(chapter: &Chapter) -> Vec<Exhibit> {

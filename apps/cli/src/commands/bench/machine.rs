@@ -98,6 +98,19 @@ impl Machine {
         Ok(cpu.render(scene, view, Resolve::Blend)?.stats.into())
     }
 
+    /// Pixels at which a depth filter leaves the finished picture other than one of fragments that are all sorted; `None`
+    /// without a depth filter.
+    pub(super) fn wrong_pixels(&mut self, variant: Variant, scene: &Scene, view: &View) -> Result<Option<u64>, Error> {
+        if variant.technique != Technique::Lucid {
+            return Ok(None);
+        }
+        let sorted = Variant::presorted(Technique::Lucid);
+        let expected = self.gpu_for(sorted)?.render(scene, view, Resolve::Blend, sorted.technique)?.image;
+        let image = self.gpu_for(variant)?.render(scene, view, Resolve::Blend, variant.technique)?.image;
+        let differing = image.pixels().iter().zip(expected.pixels()).filter(|(a, b)| a != b).count();
+        Ok(Some(differing as u64))
+    }
+
     /// A frame by a shader of several passes, without reading it back.
     fn run_passes(&mut self, passes: Passes, shaded: Shaded, scene: &Scene, view: &View) -> Result<Timed, Error> {
         let through = match passes.is_through_fbuffer {
@@ -168,7 +181,8 @@ impl Machine {
             Some(renderer) => renderer,
             None => open_gpu(budget_bytes, variant.storage, true)?,
         };
-        Ok(kept.insert(renderer.max_layers(variant.max_layers).presort(variant.presort)))
+        let renderer = renderer.max_layers(variant.max_layers).presort(variant.presort);
+        Ok(kept.insert(renderer.depth_filter(variant.depth_filter())))
     }
 }
 

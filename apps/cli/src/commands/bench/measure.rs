@@ -8,7 +8,7 @@ use pellucid::{Error, Scene, View};
 use super::machine::Machine;
 use super::pace::Pace;
 use super::results::{Figures, Measurement, Outcome, PointResult, Timed};
-use super::suite::{Point, Series, Shaded, Suite};
+use super::suite::{Point, Series, Shaded, Show, Suite};
 use super::variant::Variant;
 use crate::words::duration;
 
@@ -36,6 +36,8 @@ struct Candidate {
     spent: Duration,
     /// Why it is over before its time.
     end: Option<Outcome>,
+    /// Of the finished picture, where that is asked.
+    wrong_pixels: Option<u64>,
 }
 
 impl Effort {
@@ -103,6 +105,14 @@ pub(super) fn measure(
             }
         }
     }
+    if series.shows.contains(&Show::Wrong) {
+        for candidate in candidates.iter_mut().filter(|candidate| candidate.end.is_none()) {
+            match machine.wrong_pixels(candidate.variant, scene, view) {
+                Ok(pixels) => candidate.wrong_pixels = pixels,
+                Err(error) => candidate.end = Some(Outcome::Failed { reason: error.to_string() }),
+            }
+        }
+    }
     for candidate in candidates {
         let variant = candidate.variant;
         let outcome = candidate.outcome();
@@ -121,7 +131,7 @@ fn share_of(repeats: u32, turn: u32) -> u32 {
 
 impl Candidate {
     fn new(variant: Variant, shaded: Option<Shaded>) -> Self {
-        Self { variant, shaded, frames: Vec::new(), ms: 0.0, spent: Duration::ZERO, end: None }
+        Self { variant, shaded, frames: Vec::new(), ms: 0.0, spent: Duration::ZERO, end: None, wrong_pixels: None }
     }
 
     /// Renders a frame. `None`: it failed, and that is the end.
@@ -157,7 +167,8 @@ impl Candidate {
     fn outcome(self) -> Outcome {
         let nothing = Outcome::Skipped { reason: "no frame was measured".into() };
         self.end.unwrap_or_else(|| {
-            Figures::new(&self.frames).map_or(nothing, |figures| Outcome::Measured(Box::new(figures)))
+            Figures::new(&self.frames, self.wrong_pixels)
+                .map_or(nothing, |figures| Outcome::Measured(Box::new(figures)))
         })
     }
 }

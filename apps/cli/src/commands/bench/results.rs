@@ -1,8 +1,8 @@
 //! What was measured, as it is kept in the folder and written out.
 
-use pellucid::Stats;
 use pellucid::core::fbuffer::Drawn;
 use pellucid::gpu::Storage;
+use pellucid::{Stats, Technique};
 use serde::{Deserialize, Serialize};
 
 use super::samples::Samples;
@@ -62,6 +62,9 @@ pub(super) struct Measurement {
     pub(super) max_layers: Option<u32>,
     /// Whether an LFB is sorted in a step of its own.
     pub(super) presort: bool,
+    /// Fragments that a depth filter holds, and the share of light below which a pixel is left.
+    pub(super) filter_size: Option<u32>,
+    pub(super) alpha_threshold: Option<f32>,
     #[serde(flatten)]
     pub(super) outcome: Outcome,
 }
@@ -103,6 +106,12 @@ pub(super) struct Figures {
     pub(super) rerenders: u32,
     /// Pixels with more layers than were peeled.
     pub(super) cut_pixels: u64,
+    /// Pixels that a depth filter left out of order; `None` for techniques without, as the next two are.
+    pub(super) repaired_pixels: Option<u64>,
+    /// Pixels of the finished picture that differ from one of fragments that are all sorted.
+    pub(super) wrong_pixels: Option<u64>,
+    /// Parts of triangles in half-blocks of pixels.
+    pub(super) half_block_parts: Option<u64>,
     /// Windows of slots, of shaders of several passes.
     pub(super) slot_windows: Option<u64>,
     /// How often they drew the geometry.
@@ -176,15 +185,18 @@ impl PointResult {
 impl Measurement {
     pub(super) fn new(variant: Variant, outcome: Outcome) -> Self {
         let is_textures = variant.storage == Storage::Texture;
+        let has_filter = variant.technique == Technique::Lucid;
         Self {
             name: variant.name(),
             technique: variant.passes.map_or(variant.technique.name(), |passes| passes.through()).to_owned(),
             backend: variant.backend().to_owned(),
             threads: variant.threads,
-            storage: (variant.technique == pellucid::Technique::ABuffer)
+            storage: (variant.technique == Technique::ABuffer)
                 .then(|| if is_textures { "texture" } else { "buffer" }.to_owned()),
             max_layers: variant.max_layers,
             presort: variant.presort,
+            filter_size: has_filter.then_some(variant.depth_filter().size),
+            alpha_threshold: has_filter.then_some(variant.depth_filter().threshold),
             outcome,
         }
     }
@@ -207,7 +219,7 @@ impl Measurement {
 
 impl Figures {
     /// Of one frame or more.
-    pub(super) fn new(frames: &[Timed]) -> Option<Self> {
+    pub(super) fn new(frames: &[Timed], wrong_pixels: Option<u64>) -> Option<Self> {
         let Timed { stats: last, drawn, is_exact } = frames.last()?;
         let frames: Vec<&Stats> = frames.iter().map(|frame| &frame.stats).collect();
         // Nanoseconds are finer than any clock that matters here.
@@ -238,6 +250,9 @@ impl Figures {
             windows: last.windows,
             rerenders: last.rerenders,
             cut_pixels: last.cut_pixels,
+            repaired_pixels: (last.technique == Technique::Lucid).then_some(last.repaired_pixels),
+            wrong_pixels,
+            half_block_parts: (last.technique == Technique::Lucid).then_some(last.half_block_parts),
             slot_windows: drawn.map(|drawn| drawn.windows),
             submissions: drawn.map(|drawn| drawn.submissions),
             samples_ms,

@@ -69,6 +69,10 @@ pub(super) enum Show {
     UnitCosts,
     /// Pixels at which layers were cut off.
     Cuts,
+    /// Samples of a triangle in a half-block of pixels.
+    HalfBlocks,
+    /// Pixels that a depth filter leaves out of order, and those wrong in the picture.
+    Wrong,
     /// Exponents of power laws through the times.
     Exponents,
     /// How much faster than one thread.

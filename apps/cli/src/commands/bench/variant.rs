@@ -1,7 +1,7 @@
 //! A technique with its settings: what is compared at a point.
 
 use pellucid::Technique;
-use pellucid::gpu::Storage;
+use pellucid::gpu::{DepthFilter, Storage};
 
 /// A technique with its settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,14 @@ pub(super) struct Variant {
     pub(super) max_layers: Option<u32>,
     /// Whether fragments are sorted in a step of their own, rather than where they are read.
     pub(super) presort: bool,
+    /// Of `lucid`: fragments that its depth filter holds; `None`: as many as usual.
+    pub(super) filter_size: Option<u32>,
+    /// Of `lucid`: whether it leaves pixels through which next to no light gets.
+    pub(super) leaves_early: bool,
 }
+
+/// Share of light below which the paper leaves a pixel.
+const THRESHOLD: f32 = 1.0 / 128.0;
 
 /// How a shader of several passes is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +48,16 @@ impl Passes {
 impl Variant {
     /// A technique as it usually is.
     pub(super) fn of(technique: Technique) -> Self {
-        Self { technique, passes: None, threads: None, storage: Storage::Buffer, max_layers: None, presort: false }
+        Self {
+            technique,
+            passes: None,
+            threads: None,
+            storage: Storage::Buffer,
+            max_layers: None,
+            presort: false,
+            filter_size: None,
+            leaves_early: false,
+        }
     }
 
     pub(super) fn threads(threads: usize) -> Self {
@@ -60,6 +76,25 @@ impl Variant {
     /// An LFB that is sorted in a step of its own.
     pub(super) fn presorted(technique: Technique) -> Self {
         Self { presort: true, ..Self::of(technique) }
+    }
+
+    /// LucidRaster with another depth filter.
+    pub(super) fn filter(size: u32) -> Self {
+        Self { filter_size: Some(size), ..Self::of(Technique::Lucid) }
+    }
+
+    /// LucidRaster, not exact: pixels are left when little is seen of what lies behind.
+    pub(super) fn leaving_early() -> Self {
+        Self { leaves_early: true, ..Self::of(Technique::Lucid) }
+    }
+
+    /// How `lucid` blends.
+    pub(super) fn depth_filter(self) -> DepthFilter {
+        let usual = DepthFilter::default();
+        DepthFilter {
+            size: self.filter_size.unwrap_or(usual.size),
+            threshold: if self.leaves_early { THRESHOLD } else { usual.threshold },
+        }
     }
 
     /// A shader of several passes.
@@ -83,6 +118,8 @@ impl Variant {
             Self { max_layers: Some(layers), .. } => format!("{name} ({layers} layers)"),
             Self { threads: Some(1), .. } => format!("{name} (1 thread)"),
             Self { threads: Some(threads), .. } => format!("{name} ({threads} threads)"),
+            Self { filter_size: Some(size), .. } => format!("{name} (filter {size})"),
+            Self { leaves_early: true, .. } => format!("{name} (threshold)"),
             Self { presort: true, .. } => format!("{name} (presort)"),
             Self { storage: Storage::Texture, .. } => format!("{name} (textures)"),
             _ => name.to_owned(),

@@ -3,6 +3,7 @@
 mod abuffer;
 mod fbuffer;
 mod lfb;
+mod lucid;
 mod peel;
 mod peers;
 mod scale;
@@ -11,7 +12,7 @@ use super::suite::Suite;
 
 /// All there are, in the order in which they are measured.
 pub(crate) const SUITES: &[Suite] =
-    &[lfb::SUITE, peel::SUITE, abuffer::SUITE, fbuffer::SUITE, scale::SUITE, peers::SUITE];
+    &[lfb::SUITE, peel::SUITE, abuffer::SUITE, fbuffer::SUITE, lucid::SUITE, scale::SUITE, peers::SUITE];
 
 /// The dragon of the LFB chapter's figure 20.7, or as many triangles.
 const DRAGON: super::suite::Source =

@@ -1,0 +1,143 @@
+//! Fragments of pixels through the depth filter, and those pixels once more that it left out of order. Twins:
+//! `shaders/technique/lucid/{blend,filter}.wesl`, and `shaders/pass/{sort,resolve}.wesl` over pixels instead of runs of them.
+
+use std::collections::HashMap;
+
+use pellucid_core::Resolve;
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
+
+use super::work::FILTER_SIZE;
+use super::{DepthFilter, buffer_group, buffers_layout};
+use crate::frame::Frame;
+use crate::memory::Window;
+use crate::pass::ordered::{Listed, OrderedPasses, compute_pipeline, resolve_code};
+use crate::readback::read_buffer;
+use crate::surface::{shader, storage_entry};
+use crate::technique::Layouts;
+use crate::{Context, GpuError, shaders};
+
+/// What a pipeline is made for: resolve, size of the filter, bits of the threshold, whether errors are shown.
+type Key = (u32, u32, u32, bool);
+
+/// Long-lived half.
+#[derive(Debug)]
+pub(super) struct Blend {
+    picture: BindGroupLayout,
+    classes: BindGroupLayout,
+    /// The list of pixels out of order, and dispatches over it.
+    wrong: BindGroupLayout,
+    lfb: BindGroupLayout,
+    module: ShaderModule,
+    pipelines: HashMap<Key, ComputePipeline>,
+    prepare: ComputePipeline,
+    sort: ComputePipeline,
+    resolve_module: ShaderModule,
+    resolves: HashMap<(&'static str, u32), ComputePipeline>,
+}
+
+impl Blend {
+    pub(super) fn new(gpu: &Context, layouts: Layouts<'_>, ordered: &OrderedPasses, lfb: &BindGroupLayout) -> Self {
+        let wrong = buffers_layout(gpu, &[(0, false), (1, false)]);
+        let module = shader(gpu, "blend", shaders::LUCID_BLEND);
+        let (picture, classes) = (layouts.picture, ordered.classes_layout());
+        let own = [Some(picture), Some(classes), Some(&wrong), Some(lfb)];
+        let listed = [Some(picture), Some(classes), None, Some(lfb)];
+        let sort_module = shader(gpu, "repair", shaders::LUCID_SORT_WRONG);
+        Self {
+            prepare: compute_pipeline(gpu, "repair", &module, "prepare", &own, &[]),
+            sort: compute_pipeline(gpu, "repair", &sort_module, "main", &listed, &[]),
+            picture: picture.clone(),
+            classes: classes.clone(),
+            wrong,
+            lfb: lfb.clone(),
+            module,
+            pipelines: HashMap::new(),
+            resolve_module: shader(gpu, "repair", shaders::LUCID_RESOLVE_WRONG),
+            resolves: HashMap::new(),
+        }
+    }
+
+    /// Blends all pixels with fragments. `wrong` and `dispatches` are its own.
+    pub(super) fn record(
+        &mut self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        listed: &Listed,
+        lfb: &BindGroup,
+        [wrong, dispatches]: [&wgpu::Buffer; 2],
+    ) -> Result<(), GpuError> {
+        let gpu = frame.gpu;
+        let DepthFilter { size, threshold } = frame.depth_filter;
+        let size = size.clamp(1, DepthFilter::GREATEST_SIZE);
+        let code = resolve_code(frame.resolve);
+        let shows_errors = frame.resolve == Resolve::Errors;
+        let layouts = [Some(&self.picture), Some(&self.classes), Some(&self.wrong), Some(&self.lfb)];
+        let pipeline = self.pipelines.entry((code, size, threshold.to_bits(), shows_errors)).or_insert_with(|| {
+            let constants = [
+                ("resolve", f64::from(code)),
+                (FILTER_SIZE, f64::from(size)),
+                ("threshold", f64::from(threshold)),
+                ("shows_errors", f64::from(u8::from(shows_errors))),
+            ];
+            compute_pipeline(gpu, "blend", &self.module, "main", &layouts, &constants)
+        });
+        let picture = frame.picture.bind_group.clone();
+        let group = buffer_group(gpu, &self.wrong, &[(0, wrong), (1, dispatches)]);
+        frame.encoder().clear_buffer(wrong, 0, Some(8));
+        let mut pass = frame.compute_pass("blend")?;
+        pass.set_bind_group(0, &picture, &[]);
+        pass.set_bind_group(1, &listed.classes, &[]);
+        pass.set_bind_group(2, &group, &[]);
+        pass.set_bind_group(3, lfb, &[]);
+        pass.set_pipeline(pipeline);
+        pass.dispatch_workgroups_indirect(&listed.dispatches, Listed::MANY);
+        pass.set_pipeline(&self.prepare);
+        pass.dispatch_workgroups(1, 1, 1);
+        drop(pass);
+        if !shows_errors {
+            self.repair(frame, lfb, [wrong, dispatches])?;
+        }
+        let [repaired, cut]: [u32; 2] = read_buffer(frame, wrong, 0, 1)?[0];
+        debug_assert!(u64::from(repaired) <= window.pixels(), "a pixel is listed once");
+        frame.repaired_pixels += u64::from(repaired);
+        frame.cut_pixels += u64::from(cut);
+        Ok(())
+    }
+
+    /// Sorts and resolves the pixels listed.
+    fn repair(
+        &mut self,
+        frame: &mut Frame<'_>,
+        lfb: &BindGroup,
+        [wrong, dispatches]: [&wgpu::Buffer; 2],
+    ) -> Result<(), GpuError> {
+        let gpu = frame.gpu;
+        let picture = frame.picture.bind_group.clone();
+        let code = resolve_code(frame.resolve);
+        let group = buffer_group(gpu, &self.classes, &[(0, wrong)]);
+        let mut pass = frame.compute_pass("repair")?;
+        pass.set_bind_group(0, &picture, &[]);
+        pass.set_bind_group(1, &group, &[]);
+        pass.set_bind_group(3, lfb, &[]);
+        pass.set_pipeline(&self.sort);
+        pass.dispatch_workgroups_indirect(dispatches, 0);
+        let layouts = [Some(&self.picture), Some(&self.classes), None, Some(&self.lfb)];
+        for entry in ["blocks", "in_order"] {
+            let pipeline = self.resolves.entry((entry, code)).or_insert_with(|| {
+                let constants = [("resolve", f64::from(code))];
+                compute_pipeline(gpu, "repair", &self.resolve_module, entry, &layouts, &constants)
+            });
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups_indirect(dispatches, 0);
+        }
+        Ok(())
+    }
+}
+
+/// The layout of an LFB that is linear.
+pub(super) fn lfb_layout(gpu: &Context) -> BindGroupLayout {
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("fragments"),
+        entries: &[0, 1].map(|binding| storage_entry(binding, ShaderStages::COMPUTE, false)),
+    })
+}
