@@ -19,5 +19,6 @@ mod small;
 mod surfaces;
 mod tile;
 mod transform;
+mod window;
 
 pub use renderer::CpuRenderer;

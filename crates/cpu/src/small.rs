@@ -172,7 +172,7 @@ impl SmallTriangles {
         fragments.make_room(place);
         let left = i32x16::load_array(simd, self.left);
         let top = i32x16::load_array(simd, self.top);
-        let (columns, rows) = (TILE_PX - 1, TILE_PX - 1);
+        let last = TILE_PX as i32 - 1;
         for _ in 0..turns {
             let mut bits = [0; LANES];
             for (bit, covered) in bits.iter_mut().zip(&covered) {
@@ -180,8 +180,9 @@ impl SmallTriangles {
             }
             let bits = i32x16::load_array(simd, bits);
             let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
-            let tile = (y >> 5) * grid.columns as i32 + (x >> 5);
-            let places = (tile << SAMPLE_BITS) | ((y & rows as i32) << 5) | (x & columns as i32);
+            let (column, row) = (x - grid.window.left, y - grid.window.top);
+            let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
+            let places = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
             let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
             let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
             // Adding zero turns -0 into 0.
@@ -372,8 +373,13 @@ impl SmallFragments {
     }
 
     /// Adds how many fragments each tile has.
-    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
-        add_counts(&self.starts, counts);
+    pub(crate) fn add_counts(&self, counts: &mut [u64]) {
+        add_counts(&self.starts, 1, counts);
+    }
+
+    /// Adds how many bytes each tile needs.
+    pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
+        add_counts(&self.starts, size_of::<SmallFragment>() + 2, bytes);
     }
 
     /// Bytes held.
@@ -384,9 +390,9 @@ impl SmallFragments {
     }
 }
 
-/// Adds the lengths of the ranges between `starts`.
-pub(crate) fn add_counts(starts: &[u32], counts: &mut [u32]) {
+/// Adds the lengths of the ranges between `starts`, each place counting as so many.
+pub(crate) fn add_counts(starts: &[u32], weight: usize, counts: &mut [u64]) {
     for (count, range) in counts.iter_mut().zip(starts.windows(2)) {
-        *count += range[1] - range[0];
+        *count += u64::from(range[1] - range[0]) * weight as u64;
     }
 }

@@ -90,9 +90,13 @@ pub(crate) struct FrameParts<'a> {
 }
 
 impl TileCapture {
-    /// Captures a tile and orders its fragments.
-    pub(crate) fn capture(&mut self, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
+    /// Captures a tile.
+    pub(crate) fn capture(&mut self, number: u32, frame: FrameParts<'_>) {
         dispatch!(frame.level, simd => self.capture_simd(simd, number, frame));
+    }
+
+    /// Orders the fragments captured.
+    pub(crate) fn sort(&mut self, frame: FrameParts<'_>) -> FragmentCounts {
         self.order.sort(frame.level, &self.fragments)
     }
 

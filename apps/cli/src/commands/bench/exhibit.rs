@@ -179,10 +179,12 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 16] = [
+const STEP_ORDER: [&str; 18] = [
     "transform",
     "clip, setup and bin",
-    "raster, sort, shade and resolve",
+    "raster",
+    "order",
+    "shade and resolve",
     "geometry",
     "opaque",
     "passes",
