@@ -65,6 +65,12 @@ impl TileGrid {
         }
     }
 
+    /// Rows of pixels in a tile.
+    pub(crate) fn tile_rows(&self, number: u32) -> u32 {
+        let rect = self.tile(number);
+        (rect.bottom + 1 - rect.top) as u32
+    }
+
     /// The pixels of the window whose centres lie in a triangle's bounding box; `None` if there are none.
     #[inline]
     pub(crate) fn samples_in_bounds(&self, [a, b, c]: &[ScreenVertex; 3]) -> Option<PixelRect> {

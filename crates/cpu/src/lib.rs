@@ -13,6 +13,7 @@ mod order;
 mod raster;
 mod renderer;
 mod setup;
+mod shade;
 mod sight;
 pub mod simd;
 mod small;

@@ -336,14 +336,20 @@ impl<'a> Run<'a> {
             let mut counts = FragmentCounts::default();
             let mut times = [Duration::ZERO; 3];
             while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let started = Instant::now();
-                worker.capture.capture(tile, frame);
-                let captured = Instant::now();
-                counts = counts.merged(worker.capture.sort(frame));
-                let ordered = Instant::now();
-                resolve(frame, &worker.capture, &mut worker.buffers);
-                for (time, new) in times.iter_mut().zip([captured - started, ordered - captured, ordered.elapsed()]) {
-                    *time += new;
+                let mut started = Instant::now();
+                let rows = frame.band_rows(tile);
+                for first in (0..grid.tile_rows(tile)).step_by(rows as usize) {
+                    worker.capture.capture(tile, [first, rows], frame);
+                    let captured = Instant::now();
+                    counts = counts.merged(worker.capture.sort(frame));
+                    let ordered = Instant::now();
+                    resolve(frame, &worker.capture, &mut worker.buffers);
+                    let resolved = Instant::now();
+                    let new = [captured - started, ordered - captured, resolved - ordered];
+                    for (time, new) in times.iter_mut().zip(new) {
+                        *time += new;
+                    }
+                    started = resolved;
                 }
             }
             let mut results = lock(&results);
