@@ -178,10 +178,10 @@ impl Order {
 #[inline(always)]
 fn sort_rows<S: Simd>(simd: S, rows: &mut [Row], last: &mut Permutation) {
     if rows.len() > BLOCK {
-        if is_sorted(simd, rows.iter()) {
+        if falls(simd, rows) {
             return;
         }
-        if is_sorted(simd, rows.iter().rev()) {
+        if rises(simd, rows) {
             rows.reverse();
             return;
         }
@@ -327,7 +327,7 @@ struct Permutation {
 
 impl Permutation {
     /// Sorting fewer rows is as fast.
-    const FEWEST_ROWS: usize = 24;
+    const FEWEST_ROWS: usize = BLOCK;
 
     /// Strips that may fail one after another before no more are tried in a tile.
     const MOST_FAILURES: u32 = 4;
@@ -389,17 +389,26 @@ impl Permutation {
     }
 }
 
-/// Whether all columns fall, as those of surfaces drawn in order do; or rise, seen from the other end.
+/// Whether all columns fall, as those of surfaces drawn from front to back do.
 #[inline(always)]
-fn is_sorted<'r, S: Simd>(simd: S, mut rows: impl Iterator<Item = &'r Row>) -> bool {
-    let Some(first) = rows.next() else { return true };
-    let mut last = load(simd, first);
-    rows.all(|row| {
-        let this = load(simd, row);
-        let falls = this.simd_le(last).all_true();
-        last = this;
-        falls
-    })
+fn falls<S: Simd>(simd: S, rows: &[Row]) -> bool {
+    for pair in rows.windows(2) {
+        if !load(simd, &pair[1]).simd_le(load(simd, &pair[0])).all_true() {
+            return false;
+        }
+    }
+    true
+}
+
+/// Whether all columns rise, and have no empty place at the end.
+#[inline(always)]
+fn rises<S: Simd>(simd: S, rows: &[Row]) -> bool {
+    for pair in rows.windows(2) {
+        if !load(simd, &pair[1]).simd_ge(load(simd, &pair[0])).all_true() {
+            return false;
+        }
+    }
+    true
 }
 
 #[cfg(test)]

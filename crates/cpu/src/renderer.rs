@@ -321,13 +321,13 @@ impl<'a> Run<'a> {
     ) -> FragmentCounts {
         let start = Instant::now();
         let frame = FrameParts { chunks, draws: &self.draws, palette: &self.palette, grid, level: self.level };
-        let mut costs = vec![0; grid.tile_count()];
-        for chunk in chunks {
-            chunk.opaque.add_counts(&mut costs);
-            chunk.transparent.add_counts(&mut costs);
+        let (mut records, mut small) = (vec![0; grid.tile_count()], vec![0; grid.tile_count()]);
+        for bins in chunks.iter().flat_map(|chunk| [&chunk.opaque, &chunk.transparent]) {
+            bins.records.add_counts(&mut records);
+            bins.small.add_counts(&mut small);
         }
         let mut tiles: Vec<u32> = (0..grid.tile_count() as u32).collect();
-        tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(costs[tile as usize]));
+        tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(records[tile as usize] + small[tile as usize]));
         let spare = Mutex::new(std::mem::take(&mut memory.workers));
         let next = AtomicUsize::new(0);
         let results = Mutex::new((FragmentCounts::default(), [Duration::ZERO; 3], 0));
@@ -337,7 +337,7 @@ impl<'a> Run<'a> {
             let mut times = [Duration::ZERO; 3];
             while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let mut started = Instant::now();
-                let rows = frame.band_rows(tile);
+                let rows = frame.band_rows(tile, records[tile as usize], small[tile as usize]);
                 for first in (0..grid.tile_rows(tile)).step_by(rows as usize) {
                     worker.capture.capture(tile, [first, rows], frame);
                     let captured = Instant::now();

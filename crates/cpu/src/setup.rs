@@ -52,12 +52,6 @@ pub(crate) struct PassBins {
 }
 
 impl PassBins {
-    /// Adds how much each tile has to do.
-    pub(crate) fn add_counts(&self, counts: &mut [u64]) {
-        self.records.add_counts(counts);
-        self.small.add_counts(counts);
-    }
-
     /// Adds how many bytes each tile needs.
     pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
         self.records.add_bytes(size_of::<Record>(), bytes);

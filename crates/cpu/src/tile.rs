@@ -120,14 +120,26 @@ const FEWEST_ROWS: u32 = 2;
 const RECORDS_FOR_A_GUESS: usize = 8;
 
 impl FrameParts<'_> {
-    /// Rows of the bands into which a tile is cut, so that each has few enough fragments. So a tile's memory does not
-    /// grow with depth complexity either, up to thousands.
-    pub(crate) fn band_rows(&self, number: u32) -> u32 {
+    /// Rows of the bands into which a tile of so many records and small fragments is cut, so that each has few enough
+    /// fragments. So a tile's memory does not grow with depth complexity either, up to thousands.
+    pub(crate) fn band_rows(&self, number: u32, records: u64, small: u64) -> u32 {
+        let mut fragments = small;
+        if small + records * TILE_SAMPLES as u64 > MOST_FRAGMENTS {
+            fragments += self.guess_fragments(number);
+        }
+        let mut rows = TILE_PX;
+        while fragments > MOST_FRAGMENTS && rows > FEWEST_ROWS {
+            (rows, fragments) = (rows / 2, fragments / 2);
+        }
+        rows
+    }
+
+    /// About how many fragments the records of a tile have.
+    fn guess_fragments(&self, number: u32) -> u64 {
         let rect = self.grid.tile(number);
         let mut fragments = 0;
         for chunk in self.chunks {
             for bins in [&chunk.opaque, &chunk.transparent] {
-                fragments += bins.small.tile(number).1.len() as u64;
                 for &record in bins.records.tile(number).iter().step_by(RECORDS_FOR_A_GUESS) {
                     if let Some(samples) = self.grid.samples_in_bounds(&chunk.record(record).vertices) {
                         let columns = samples.right.min(rect.right) + 1 - samples.left.max(rect.left);
@@ -138,11 +150,7 @@ impl FrameParts<'_> {
                 }
             }
         }
-        let mut rows = TILE_PX;
-        while fragments > MOST_FRAGMENTS && rows > FEWEST_ROWS {
-            (rows, fragments) = (rows / 2, fragments / 2);
-        }
-        rows
+        fragments
     }
 }
 
