@@ -37,21 +37,6 @@ impl<S: Simd> Wide<S> {
     }
 
     #[inline(always)]
-    pub(crate) fn load(simd: S, values: &[f64; 16]) -> Self {
-        let (low, high) = values.split_at(8);
-        Self(f64x8::from_slice(simd, low), f64x8::from_slice(simd, high))
-    }
-
-    #[inline(always)]
-    pub(crate) fn to_array(self) -> [f64; 16] {
-        let mut array = [0.0; 16];
-        let (low, high) = array.split_at_mut(8);
-        self.0.store_slice(low);
-        self.1.store_slice(high);
-        array
-    }
-
-    #[inline(always)]
     pub(crate) fn from_f32(values: f32x16<S>) -> Self {
         let (low, high) = values.widen();
         Self(low, high)

@@ -1,9 +1,8 @@
 //! Small triangles to fragments, sixteen triangles at a time.
 //!
-//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up, sixteen
-//! in one go, of as many triangles as that takes: the first fragments of sixteen triangles together, then the second, would
-//! leave most lanes idle, as triangles differ in how many they have. All that is left for the tile is to order and blend
-//! them. A triangle that reaches several blocks of samples takes part once for each.
+//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up: the
+//! first of all sixteen triangles in one go, then the second, and so on. All that is left for the tile is to order and
+//! blend them. A triangle that reaches several blocks of samples takes part once for each.
 
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, f32x16, i32x16};
 use glam::Vec3;
@@ -156,136 +155,64 @@ impl SmallTriangles {
             steady_light = light(simd, in_view(draw, normal));
         }
 
-        let depth_plane = [depth_plane.value.to_array(), depth_plane.dx.to_array(), depth_plane.dy.to_array()];
-        let mut batch = Batch { draw_number, range: [least.into(), greatest.into()], depth_plane, ..Batch::default() };
-        batch.steady_light = steady_light.into();
-        batch.anchor = [anchor_x.into(), anchor_y.into()];
-        let has_normals = normal_planes.is_some();
-        if let Some(planes) = normal_planes {
-            for (to, plane) in batch.normal_planes.iter_mut().zip(planes) {
-                *to = [plane[0].into(), plane[1].into(), plane[2].into()];
-            }
+        // Fragments are made in turns but put down in draw order.
+        let mut next = [0; LANES];
+        let mut covered = [0; LANES];
+        let mut primitives = [0; LANES];
+        let mut place = fragments.count;
+        // A bit for each lane that has fragments left.
+        let mut active = 0u32;
+        for lane in 0..triangle_count {
+            next[lane] = place;
+            covered[lane] = self.covered[lane];
+            primitives[lane] = draw.first_primitive + self.triangles[lane];
+            place += covered[lane].count_ones() as usize;
+            active |= u32::from(covered[lane] != 0) << lane;
         }
-        // Fragments of all the triangles, in draw order, sixteen at a time.
-        let total: u32 = self.covered[..triangle_count].iter().map(|covered| covered.count_ones()).sum();
-        fragments.make_room(fragments.count + total as usize + LANES);
-        for triangle in 0..triangle_count {
-            let mut covered = self.covered[triangle];
-            let (left, top) = (self.left[triangle], self.top[triangle]);
-            let primitive = draw.first_primitive + self.triangles[triangle];
-            while covered != 0 {
-                let bit = covered.trailing_zeros() as i32;
-                covered &= covered - 1;
-                batch.push(triangle, left + (bit & (BLOCK_PX - 1)), top + (bit >> 3), primitive);
-                if batch.count == LANES {
-                    batch.make(simd, has_normals, grid, fragments);
-                }
-            }
-        }
-        if batch.count > 0 {
-            batch.make(simd, has_normals, grid, fragments);
-        }
-    }
-}
-
-/// Fragments that wait to be sixteen, and the planes of the triangles they may be of.
-#[derive(Default)]
-struct Batch {
-    draw_number: u32,
-    anchor: [[i32; LANES]; 2],
-    depth_plane: [[f64; LANES]; 3],
-    range: [[f32; LANES]; 2],
-    steady_light: [f32; LANES],
-    normal_planes: [[[f32; LANES]; 3]; 3],
-    count: usize,
-    triangles: [u8; LANES],
-    x: [i32; LANES],
-    y: [i32; LANES],
-    primitives: [u32; LANES],
-}
-
-impl Batch {
-    #[inline(always)]
-    fn push(&mut self, triangle: usize, x: i32, y: i32, primitive: u32) {
-        let lane = self.count;
-        self.triangles[lane] = triangle as u8;
-        self.x[lane] = x;
-        self.y[lane] = y;
-        self.primitives[lane] = primitive;
-        self.count += 1;
-    }
-
-    /// Adds the fragments.
-    #[inline(always)]
-    fn make<S: Simd>(&mut self, simd: S, has_normals: bool, grid: &TileGrid, fragments: &mut NewFragments) {
-        let count = std::mem::take(&mut self.count);
-        let triangles = &self.triangles;
-        let (x, y) = (i32x16::load_array(simd, self.x), i32x16::load_array(simd, self.y));
-        let (column, row) = (x - grid.window.left, y - grid.window.top);
+        fragments.make_room(place);
+        let left = i32x16::load_array(simd, self.left);
+        let top = i32x16::load_array(simd, self.top);
         let last = TILE_PX as i32 - 1;
-        let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
-        let places: [i32; LANES] = ((tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last)).into();
-        let (anchor_x, anchor_y): (i32x16<S>, i32x16<S>) = (
-            i32x16::load_array(simd, pick(&self.anchor[0], triangles)),
-            i32x16::load_array(simd, pick(&self.anchor[1], triangles)),
-        );
-        let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
-        let [value, dx, dy] = &self.depth_plane;
-        let (value, dx, dy) = (
-            Wide::load(simd, &pick(value, triangles)),
-            Wide::load(simd, &pick(dx, triangles)),
-            Wide::load(simd, &pick(dy, triangles)),
-        );
-        let depth = (value + Wide::from_f32(y) * dy) + Wide::from_f32(x) * dx;
-        let least: f32x16<S> = f32x16::load_array(simd, pick(&self.range[0], triangles));
-        let greatest: f32x16<S> = f32x16::load_array(simd, pick(&self.range[1], triangles));
-        // Adding zero turns -0 into 0.
-        let depth: [f32; LANES] = (depth.to_f32().max(least).min(greatest) + 0.0).into();
-        let light: [f32; LANES] = if has_normals {
-            let [nx, ny, nz] = &self.normal_planes;
-            let normal = [
-                at(&picked(simd, nx, triangles), x, y),
-                at(&picked(simd, ny, triangles), x, y),
-                at(&picked(simd, nz, triangles), x, y),
-            ];
-            light(simd, normal).into()
-        } else {
-            pick(&self.steady_light, triangles)
-        };
-        let first = fragments.count;
-        for (to, from) in fragments.places[first..first + LANES].iter_mut().zip(places) {
-            *to = from as u32;
-        }
-        let to = &mut fragments.fragments[first..first + LANES];
-        for lane in 0..LANES {
-            to[lane] = SmallFragment {
-                depth: depth[lane],
-                light: light[lane],
-                primitive: self.primitives[lane],
-                draw: self.draw_number,
+        while active != 0 {
+            let mut bits = [0; LANES];
+            for (bit, covered) in bits.iter_mut().zip(&covered) {
+                *bit = covered.trailing_zeros() as i32;
+            }
+            let bits = i32x16::load_array(simd, bits);
+            let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
+            let (column, row) = (x - grid.window.left, y - grid.window.top);
+            let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
+            let places = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
+            let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
+            let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
+            // Adding zero turns -0 into 0.
+            let depth = depth.to_f32().max(least).min(greatest) + 0.0;
+            let light = match &normal_planes {
+                None => steady_light,
+                Some([nx, ny, nz]) => light(simd, [at(nx, x, y), at(ny, x, y), at(nz, x, y)]),
             };
+            let (places, depth, light): ([i32; LANES], [f32; LANES], [f32; LANES]) =
+                (places.into(), depth.into(), light.into());
+            // Without a branch that depends on when a lane is done, which would often be mispredicted.
+            let mut lanes = active;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LANES;
+                lanes &= lanes - 1;
+                covered[lane] &= covered[lane] - 1;
+                active &= !(u32::from(covered[lane] == 0) << lane);
+                let place = next[lane];
+                next[lane] += 1;
+                fragments.places[place] = places[lane] as u32;
+                fragments.fragments[place] = SmallFragment {
+                    depth: depth[lane],
+                    light: light[lane],
+                    primitive: primitives[lane],
+                    draw: draw_number,
+                };
+            }
         }
-        fragments.count += count;
+        fragments.count = place;
     }
-}
-
-/// What the triangle of each lane has.
-#[inline(always)]
-fn pick<T: Copy + Default>(from: &[T; LANES], triangles: &[u8; LANES]) -> [T; LANES] {
-    let mut picked = [T::default(); LANES];
-    for (to, triangle) in picked.iter_mut().zip(triangles) {
-        *to = from[*triangle as usize % LANES];
-    }
-    picked
-}
-
-#[inline(always)]
-fn picked<S: Simd>(simd: S, [value, dx, dy]: &[[f32; LANES]; 3], triangles: &[u8; LANES]) -> [f32x16<S>; 3] {
-    [
-        f32x16::load_array(simd, pick(value, triangles)),
-        f32x16::load_array(simd, pick(dx, triangles)),
-        f32x16::load_array(simd, pick(dy, triangles)),
-    ]
 }
 
 /// A plane for each of sixteen triangles.
