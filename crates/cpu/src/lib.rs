@@ -9,6 +9,7 @@ mod bin;
 mod blend;
 pub mod fbuffer;
 mod fragments;
+mod networks;
 mod order;
 mod raster;
 mod renderer;

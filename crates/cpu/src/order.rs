@@ -1,24 +1,22 @@
 //! Fragments into order: those of each pixel side by side, nearest first.
 //!
-//! Eight pixels are sorted at a time, a pixel to a lane: pixels of about equally many fragments are put together into a
-//! *strip*, whose row `i` holds the `i`-th key of each, and sorting networks compare whole rows. Networks take no branches
-//! that depend on the keys; insertion sort (LFB chapter, section 20.4.1), pixel by pixel, takes one mispredicted branch for
-//! each pixel and about one for each fragment, which costs more than all its comparisons.
+//! Eight pixels are sorted at a time, a pixel to a lane: neighbours of few fragments, or pixels of about equally many, are
+//! put together into a *strip*, whose row `i` holds the `i`-th key of each, and sorting networks compare whole rows.
+//! Networks take no branches that depend on the keys; insertion sort (LFB chapter, section 20.4.1), pixel by pixel, takes
+//! one mispredicted branch for each pixel and about one for each fragment, which costs more than all its comparisons.
 //!
 //! A key is a fragment's depth above its number in the tile. As fragments are numbered in draw order, this orders like the
 //! contract's order key. Keys are positive and look like f64 numbers of the same order, and of those every SIMD level has
 //! maximum and minimum.
 
-use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, f64x8, u64x8};
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::fragments::Fragments;
+use crate::networks::{BLOCK, Permutation, sort_rows};
 use crate::tile::{FragmentCounts, TILE_SAMPLES};
 
 /// Pixels of a strip.
 pub(crate) const STRIP: usize = 8;
-
-/// Rows that a network sorts in registers.
-const BLOCK: usize = 8;
 
 /// The order of a tile's fragments.
 #[derive(Debug)]
@@ -38,7 +36,7 @@ pub(crate) struct Order {
 #[repr(align(64))]
 pub(crate) struct Row(pub(crate) [u64; STRIP]);
 
-/// Eight pixels of about equally many fragments.
+/// Eight pixels: neighbours, or of about equally many fragments.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Strip {
     first_row: u32,
@@ -115,11 +113,45 @@ impl Order {
         }
     }
 
-    /// Puts the samples that have fragments together into strips; returns how many rows these have.
+    /// Puts the samples that have fragments together into strips; returns how many rows these have. Neighbours that have
+    /// few are a strip, however few; others are first sorted by how many.
     fn make_strips(&mut self, totals: &mut FragmentCounts) -> usize {
+        let mut row_count = 0;
+        let mut many = [0u16; TILE_SAMPLES / STRIP];
+        let mut many_count = 0;
+        for (group, counts) in self.counts.as_chunks::<STRIP>().0.iter().enumerate() {
+            let greatest = counts.iter().fold(0, |greatest, &count| greatest.max(count));
+            if greatest == 0 {
+                continue;
+            }
+            totals.covered_pixels += counts.iter().map(|&count| u64::from(count > 0)).sum::<u64>();
+            totals.greatest = totals.greatest.max(greatest);
+            if greatest as usize > BLOCK {
+                many[many_count] = group as u16;
+                many_count += 1;
+                continue;
+            }
+            let first = group * STRIP;
+            let samples = std::array::from_fn(|lane| (first + lane) as u16);
+            for (lane, key) in self.firsts[first..first + STRIP].iter_mut().enumerate() {
+                *key = (row_count * STRIP + lane) as u32;
+            }
+            let strip = Strip { first_row: row_count as u32, row_count: greatest, samples, sample_count: STRIP as u32 };
+            self.strips.push(strip);
+            row_count += greatest as usize;
+        }
+        if many_count > 0 {
+            row_count = self.make_strips_by_count(&many[..many_count], row_count);
+        }
+        row_count
+    }
+
+    /// Puts the samples of groups of neighbours together by how many fragments they have.
+    fn make_strips_by_count(&mut self, groups: &[u16], mut row_count: usize) -> usize {
+        let samples = || groups.iter().flat_map(|&group| (0..STRIP).map(move |lane| group as usize * STRIP + lane));
         let mut starts = [0u16; CLASSES];
-        for &count in &self.counts {
-            starts[class(count)] += 1;
+        for sample in samples() {
+            starts[class(self.counts[sample])] += 1;
         }
         // Most fragments last; samples without any are left out.
         let mut start = 0;
@@ -127,29 +159,27 @@ impl Order {
         for place in &mut starts {
             start += std::mem::replace(place, start);
         }
-        let covered = start as usize;
         let mut by_class = [0u16; TILE_SAMPLES];
-        for (sample, &count) in self.counts.iter().enumerate() {
+        for sample in samples() {
+            let count = self.counts[sample];
             if count > 0 {
                 let place = &mut starts[class(count)];
                 by_class[*place as usize] = sample as u16;
                 *place += 1;
             }
         }
-        totals.covered_pixels = covered as u64;
-        let mut first_row = 0;
-        for samples in by_class[..covered].chunks(STRIP) {
+        for samples in by_class[..start as usize].chunks(STRIP) {
+            let first_row = row_count as u32;
             let mut strip = Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
             for (lane, &sample) in samples.iter().enumerate() {
                 strip.samples[lane] = sample;
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);
-                self.firsts[sample as usize] = first_row * STRIP as u32 + lane as u32;
+                self.firsts[sample as usize] = (row_count * STRIP + lane) as u32;
             }
-            totals.greatest = totals.greatest.max(strip.row_count);
-            first_row += strip.row_count;
+            row_count += strip.row_count as usize;
             self.strips.push(strip);
         }
-        first_row as usize
+        row_count
     }
 
     /// The rows of a strip: in each the number of a fragment of every pixel in the low half of a key, 0 for none.
@@ -171,308 +201,5 @@ impl Order {
             + self.strips.capacity() * size_of::<Strip>()
             + TILE_SAMPLES * 8
             + self.last.bytes()
-    }
-}
-
-/// Sorts every column of `rows`, greatest first: blocks by networks, which are then merged.
-#[inline(always)]
-fn sort_rows<S: Simd>(simd: S, rows: &mut [Row], last: &mut Permutation) {
-    if rows.len() > BLOCK {
-        if falls(simd, rows) {
-            return;
-        }
-        if rises(simd, rows) {
-            rows.reverse();
-            return;
-        }
-    }
-    let many = rows.len() > Permutation::FEWEST_ROWS;
-    if many && last.apply(simd, rows) {
-        return;
-    }
-    if many {
-        last.before(rows);
-    }
-    for block in rows.chunks_mut(BLOCK) {
-        match block.len() {
-            0 | 1 => {}
-            2 => sort_2(simd, block),
-            3 | 4 => sort_4(simd, block),
-            _ => sort_8(simd, block),
-        }
-    }
-    let mut sorted = BLOCK;
-    while sorted < rows.len() {
-        for pair in rows.chunks_mut(2 * sorted).filter(|pair| pair.len() > sorted) {
-            merge(simd, pair, sorted);
-        }
-        sorted *= 2;
-    }
-    if many {
-        last.after(rows);
-    }
-}
-
-#[inline(always)]
-fn load<S: Simd>(simd: S, row: &Row) -> f64x8<S> {
-    u64x8::load_array_ref(simd, &row.0).bitcast()
-}
-
-#[inline(always)]
-fn store<S: Simd>(keys: f64x8<S>, row: &mut Row) {
-    keys.bitcast::<u64x8<S>>().store_array(&mut row.0);
-}
-
-/// Puts the greater of each two first, in registers.
-macro_rules! compare {
-    ($keys:ident, $($near:literal $far:literal),*) => {
-        $(
-            let (a, b) = ($keys[$near], $keys[$far]);
-            ($keys[$near], $keys[$far]) = (a.max(b), a.min(b));
-        )*
-    };
-}
-
-/// Sorts up to so many rows in registers by Batcher's odd-even merge sort (1968).
-macro_rules! network {
-    ($name:ident, $count:literal, $($near:literal $far:literal),*) => {
-        #[inline(always)]
-        fn $name<S: Simd>(simd: S, rows: &mut [Row]) {
-            let mut sorted = [f64x8::splat(simd, 0.0); $count];
-            for (keys, row) in sorted.iter_mut().zip(rows.iter()) {
-                *keys = load(simd, row);
-            }
-            compare!(sorted, $($near $far),*);
-            for (row, keys) in rows.iter_mut().zip(sorted) {
-                store(keys, row);
-            }
-        }
-    };
-}
-
-network!(sort_2, 2, 0 1);
-network!(sort_4, 4, 0 1, 2 3, 0 2, 1 3, 1 2);
-network!(
-    sort_8,
-    8,
-    0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6
-);
-
-/// Merges `sorted` sorted rows, a power of two, with the sorted rest: Batcher's bitonic merge, of which the first step
-/// compares from both ends, so that the greater key always moves to the front, and rows that are not there behave like 0.
-/// Three steps at a time are done in registers; the odd-even merge has fewer comparisons, but they fall into no such blocks.
-#[inline(always)]
-fn merge<S: Simd>(simd: S, rows: &mut [Row], sorted: usize) {
-    let (near, far) = rows.split_at_mut(sorted);
-    let first = sorted - far.len();
-    for (near, far) in near[first..].iter_mut().zip(far.iter_mut().rev()) {
-        exchange(simd, near, far);
-    }
-    let steps = sorted.ilog2();
-    let mut step = sorted / 2;
-    for _ in 0..steps % 3 {
-        for block in rows.chunks_mut(2 * step).filter(|block| block.len() > step) {
-            let (near, far) = block.split_at_mut(step);
-            for (near, far) in near.iter_mut().zip(far) {
-                exchange(simd, near, far);
-            }
-        }
-        step /= 2;
-    }
-    // The rest is a multiple of three steps.
-    while step >= 1 {
-        let stride = step / 4;
-        for block in rows.chunks_mut(2 * step) {
-            for i in 0..stride.min(block.len()) {
-                clean(simd, &mut block[i..], stride);
-            }
-        }
-        step /= 8;
-    }
-}
-
-/// The steps of 4, 2 and 1 between the first eight rows of those that are `stride` apart.
-#[inline(always)]
-fn clean<S: Simd>(simd: S, rows: &mut [Row], stride: usize) {
-    let mut keys = [f64x8::splat(simd, 0.0); 8];
-    for (keys, row) in keys.iter_mut().zip(rows.iter().step_by(stride)) {
-        *keys = load(simd, row);
-    }
-    compare!(keys, 0 4, 1 5, 2 6, 3 7, 0 2, 1 3, 4 6, 5 7, 0 1, 2 3, 4 5, 6 7);
-    for (keys, row) in keys.into_iter().zip(rows.iter_mut().step_by(stride)) {
-        store(keys, row);
-    }
-}
-
-/// Compares and exchanges two rows.
-#[inline(always)]
-fn exchange<S: Simd>(simd: S, near: &mut Row, far: &mut Row) {
-    let (a, b) = (load(simd, near), load(simd, far));
-    store(a.max(b), near);
-    store(a.min(b), far);
-}
-
-/// How a strip was brought into order. Where large surfaces lie behind each other the next strip shows the same ones, and
-/// what ordered one orders the other, which takes a look at each row instead of a sort.
-#[derive(Debug, Default)]
-struct Permutation {
-    /// From where the row in each place came.
-    from: Vec<u32>,
-    /// The row of each fragment of the first pixel, by its number in the tile.
-    row_of: Vec<u32>,
-    ordered: Vec<Row>,
-    /// Strips on which it failed since it fitted one.
-    failures: u32,
-}
-
-impl Permutation {
-    /// Sorting fewer rows is as fast.
-    const FEWEST_ROWS: usize = BLOCK;
-
-    /// Strips that may fail one after another before no more are tried in a tile.
-    const MOST_FAILURES: u32 = 4;
-
-    /// Begins a tile with so many numbers.
-    fn begin(&mut self, numbers: usize) {
-        self.from.clear();
-        self.failures = 0;
-        if self.row_of.len() < numbers {
-            self.row_of.resize(numbers.next_power_of_two(), 0);
-        }
-    }
-
-    /// Orders rows as the last ones were; `false`, with nothing done, if that is not their order.
-    #[inline(always)]
-    fn apply<S: Simd>(&mut self, simd: S, rows: &mut [Row]) -> bool {
-        if self.from.len() != rows.len() {
-            return false;
-        }
-        self.ordered.clear();
-        let mut last = f64x8::splat(simd, f64::INFINITY);
-        for &from in &self.from {
-            let row = rows[from as usize];
-            let keys = load(simd, &row);
-            if !keys.simd_le(last).all_true() {
-                self.failures += 1;
-                return false;
-            }
-            last = keys;
-            self.ordered.push(row);
-        }
-        rows.copy_from_slice(&self.ordered);
-        self.failures = 0;
-        true
-    }
-
-    /// Looks at rows before they are sorted ...
-    #[inline(always)]
-    fn before(&mut self, rows: &[Row]) {
-        if self.failures < Self::MOST_FAILURES {
-            for (i, row) in rows.iter().enumerate() {
-                self.row_of[row.0[0] as u32 as usize] = i as u32;
-            }
-        }
-    }
-
-    /// ... and afterwards.
-    #[inline(always)]
-    fn after(&mut self, rows: &[Row]) {
-        self.from.clear();
-        // Where the first pixel has fewer fragments than others, its keys do not tell all rows apart.
-        if self.failures < Self::MOST_FAILURES && rows.last().is_some_and(|row| row.0[0] != 0) {
-            self.from.extend(rows.iter().map(|row| self.row_of[row.0[0] as u32 as usize]));
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        (self.from.capacity() + self.row_of.capacity()) * 4 + self.ordered.capacity() * size_of::<Row>()
-    }
-}
-
-/// Whether all columns fall, as those of surfaces drawn from front to back do.
-#[inline(always)]
-fn falls<S: Simd>(simd: S, rows: &[Row]) -> bool {
-    for pair in rows.windows(2) {
-        if !load(simd, &pair[1]).simd_le(load(simd, &pair[0])).all_true() {
-            return false;
-        }
-    }
-    true
-}
-
-/// Whether all columns rise, and have no empty place at the end.
-#[inline(always)]
-fn rises<S: Simd>(simd: S, rows: &[Row]) -> bool {
-    for pair in rows.windows(2) {
-        if !load(simd, &pair[1]).simd_ge(load(simd, &pair[0])).all_true() {
-            return false;
-        }
-    }
-    true
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simd::levels;
-
-    /// Rows of different keys, each column in another order; the last rows of some columns are empty.
-    fn shuffled(count: usize, seed: u64) -> Vec<Row> {
-        let mut state = seed;
-        let mut random = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            state >> 33
-        };
-        let mut rows = vec![Row::default(); count];
-        for lane in 0..STRIP {
-            let filled = count - if lane % 3 == 2 { random() as usize % 4 % count } else { 0 };
-            for (i, row) in rows[..filled].iter_mut().enumerate() {
-                let depth = 0.5 + (random() % 1000) as f32 / 4096.0;
-                row.0[lane] = u64::from(depth.to_bits()) << 32 | (i * STRIP + lane + 1) as u64;
-            }
-        }
-        rows
-    }
-
-    #[test]
-    fn every_column_falls_at_any_level_and_length() {
-        for (name, level) in levels() {
-            let mut last = Permutation::default();
-            for count in (1..80).chain([95, 96, 97, 128, 129, 255, 256, 257, 500, 1000]) {
-                last.begin(count * STRIP + 1);
-                // The second time they come in the order that the first time ended in.
-                for seed in [count as u64, count as u64] {
-                    let mut rows = shuffled(count, seed);
-                    let mut expected = rows.clone();
-                    for lane in 0..STRIP {
-                        let mut column: Vec<u64> = rows.iter().map(|row| row.0[lane]).collect();
-                        column.sort_unstable_by(|a, b| b.cmp(a));
-                        for (row, key) in expected.iter_mut().zip(column) {
-                            row.0[lane] = key;
-                        }
-                    }
-                    dispatch!(level, simd => sort_rows(simd, &mut rows, &mut last));
-                    assert!(rows.iter().zip(&expected).all(|(a, b)| a.0 == b.0), "{count} rows at {name}");
-                }
-            }
-        }
-    }
-
-    /// Columns in one order, as large surfaces make them: all but the first strip follow it.
-    #[test]
-    fn what_ordered_one_strip_orders_the_next() {
-        let level = Level::new();
-        let rows = |offset: u64| -> Vec<Row> {
-            let row = |i: u64| Row([(i * 37 % 100 + 1) << 32 | (i + 1 + offset); STRIP]);
-            (0..100).map(row).collect()
-        };
-        let mut last = Permutation::default();
-        last.begin(1000);
-        for offset in [0, 300, 600] {
-            let mut rows = rows(offset);
-            assert_eq!(dispatch!(level, simd => last.apply(simd, &mut rows)), offset > 0);
-            dispatch!(level, simd => sort_rows(simd, &mut rows, &mut last));
-            assert!(rows.is_sorted_by(|a, b| a.0[0] > b.0[0]));
-        }
     }
 }
