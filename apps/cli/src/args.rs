@@ -185,7 +185,7 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
     pub(crate) threads: String,
 
-    /// Bytes that a GPU capture may hold, such as 512M
+    /// Bytes that a capture may hold, such as 512M
     #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     pub(crate) budget: Option<String>,
 
@@ -237,7 +237,7 @@ pub(crate) struct DeviceArgs {
     #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
     pub(crate) threads: String,
 
-    /// Bytes that a GPU capture may hold, such as 512M; the CPU holds one tile a thread and needs no bound
+    /// Bytes that a capture may hold, such as 512M
     #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     pub(crate) budget: Option<String>,
 }

@@ -62,7 +62,11 @@ impl DevicePlan {
 
     /// A renderer for the CPU.
     pub(crate) fn cpu(&self) -> Renderer {
-        Renderer::new().threads(self.threads)
+        let renderer = Renderer::new().threads(self.threads);
+        match self.budget_bytes {
+            Some(budget_bytes) => renderer.budget_bytes(budget_bytes),
+            None => renderer,
+        }
     }
 
     fn allows(&self, technique: Technique) -> bool {

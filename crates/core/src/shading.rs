@@ -97,10 +97,14 @@ pub fn lit(premultiplied: Vec4, light: f32) -> Vec4 {
 /// affine on the screen.
 #[derive(Debug, Clone)]
 pub struct Varying {
-    weights: [Plane; 2],
-    inv_w: [f32; 3],
-    vertex_colors: Option<[Vec4; 3]>,
-    tex_coords: Option<[Vec2; 3]>,
+    /// Weights of the second and third corner.
+    pub weights: [Plane; 2],
+    /// 1 / w at the corners.
+    pub inv_w: [f32; 3],
+    /// Vertex colours over w, if there are any.
+    pub vertex_colors: Option<[Vec4; 3]>,
+    /// Texture coordinates over w, moved as the material says, if there is a texture.
+    pub tex_coords: Option<[Vec2; 3]>,
 }
 
 impl Varying {
@@ -196,9 +200,9 @@ where
     (a * first + b * second) + c * third
 }
 
-/// Change of an interpolated value where the second and third weight change by so much.
+/// Change of a value interpolated between corners where the second and third weight change by so much.
 #[inline]
-fn slope<T>([a, b, c]: [T; 3], second: f32, third: f32) -> T
+pub fn slope<T>([a, b, c]: [T; 3], second: f32, third: f32) -> T
 where
     T: Copy + std::ops::Add<Output = T> + std::ops::Sub<Output = T> + std::ops::Mul<f32, Output = T>,
 {

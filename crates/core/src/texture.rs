@@ -82,18 +82,27 @@ pub struct Texture {
     sampler: Sampler,
 }
 
-/// What the 256 values of a channel mean.
-struct Decoder {
-    linear: [f32; 256],
-    alpha: [f32; 256],
+/// What the 256 values of a texel's channel mean.
+#[derive(Debug)]
+pub struct TexelValues {
+    /// Linear light of a colour channel.
+    pub linear: [f32; 256],
+    /// Alpha.
+    pub alpha: [f32; 256],
 }
 
-static DECODER: LazyLock<Decoder> = LazyLock::new(|| Decoder {
+static DECODER: LazyLock<TexelValues> = LazyLock::new(|| TexelValues {
     linear: std::array::from_fn(|i| linear_from_srgb8(i as u8)),
     alpha: std::array::from_fn(|i| i as f32 / 255.0),
 });
 
-impl Decoder {
+impl TexelValues {
+    /// The one table.
+    #[inline]
+    pub fn get() -> &'static Self {
+        &DECODER
+    }
+
     #[inline(always)]
     fn decode(&self, [r, g, b, a]: [u8; 4]) -> Vec4 {
         let linear = &self.linear;

@@ -10,10 +10,12 @@ use crate::small::add_counts;
 /// cache, large enough that small triangles rarely lie in two.
 pub(crate) const TILE_PX: u32 = 32;
 
-/// The tiles of a picture.
+/// The tiles of a window of the picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileGrid {
     pub(crate) viewport: Viewport,
+    /// The pixels set up in one go. Begins where a tile of the whole picture begins.
+    pub(crate) window: PixelRect,
     /// Tiles side by side.
     pub(crate) columns: u32,
     /// Tiles one above another.
@@ -30,14 +32,21 @@ pub(crate) struct PixelRect {
 }
 
 impl PixelRect {
+    /// The whole picture.
+    pub(crate) fn all(viewport: &Viewport) -> Self {
+        Self { left: 0, top: 0, right: viewport.width as i32 - 1, bottom: viewport.height as i32 - 1 }
+    }
+
     pub(crate) fn is_single(self) -> bool {
         self.left == self.right && self.top == self.bottom
     }
 }
 
 impl TileGrid {
-    pub(crate) fn new(viewport: Viewport) -> Self {
-        Self { viewport, columns: viewport.width.div_ceil(TILE_PX), rows: viewport.height.div_ceil(TILE_PX) }
+    pub(crate) fn new(viewport: Viewport, window: PixelRect) -> Self {
+        let tiles = |first: i32, last: i32| ((last + 1 - first) as u32).div_ceil(TILE_PX);
+        let (columns, rows) = (tiles(window.left, window.right), tiles(window.top, window.bottom));
+        Self { viewport, window, columns, rows }
     }
 
     pub(crate) fn tile_count(&self) -> usize {
@@ -46,26 +55,33 @@ impl TileGrid {
 
     /// The pixels of a tile.
     pub(crate) fn tile(&self, number: u32) -> PixelRect {
-        let (left, top) = (number % self.columns * TILE_PX, number / self.columns * TILE_PX);
+        let left = self.window.left + (number % self.columns * TILE_PX) as i32;
+        let top = self.window.top + (number / self.columns * TILE_PX) as i32;
         PixelRect {
-            left: left as i32,
-            top: top as i32,
-            right: (left + TILE_PX).min(self.viewport.width) as i32 - 1,
-            bottom: (top + TILE_PX).min(self.viewport.height) as i32 - 1,
+            left,
+            top,
+            right: self.window.right.min(left + TILE_PX as i32 - 1),
+            bottom: self.window.bottom.min(top + TILE_PX as i32 - 1),
         }
     }
 
-    /// The pixels on screen whose centres lie in a triangle's bounding box; `None` if there are none.
+    /// Rows of pixels in a tile.
+    pub(crate) fn tile_rows(&self, number: u32) -> u32 {
+        let rect = self.tile(number);
+        (rect.bottom + 1 - rect.top) as u32
+    }
+
+    /// The pixels of the window whose centres lie in a triangle's bounding box; `None` if there are none.
     #[inline]
     pub(crate) fn samples_in_bounds(&self, [a, b, c]: &[ScreenVertex; 3]) -> Option<PixelRect> {
         // The first centre at or after a coordinate, and the last one at or before it.
         let first = |subpixels: i32| (subpixels + (SUBPIXELS / 2 - 1)) >> 8;
         let last = |subpixels: i32| (subpixels - SUBPIXELS / 2) >> 8;
         let rect = PixelRect {
-            left: first(a.x.min(b.x).min(c.x)).max(0),
-            top: first(a.y.min(b.y).min(c.y)).max(0),
-            right: last(a.x.max(b.x).max(c.x)).min(self.viewport.width as i32 - 1),
-            bottom: last(a.y.max(b.y).max(c.y)).min(self.viewport.height as i32 - 1),
+            left: first(a.x.min(b.x).min(c.x)).max(self.window.left),
+            top: first(a.y.min(b.y).min(c.y)).max(self.window.top),
+            right: last(a.x.max(b.x).max(c.x)).min(self.window.right),
+            bottom: last(a.y.max(b.y).max(c.y)).min(self.window.bottom),
         };
         (rect.left <= rect.right && rect.top <= rect.bottom).then_some(rect)
     }
@@ -89,9 +105,10 @@ impl Bins {
     /// Adds a record with the pixels it may cover.
     #[inline]
     pub(crate) fn add(&mut self, record: u32, vertices: &[ScreenVertex; 3], samples: PixelRect, grid: &TileGrid) {
-        let tile = |pixel: i32| pixel as u32 / TILE_PX;
-        let (columns, rows) =
-            (tile(samples.left)..tile(samples.right) + 1, tile(samples.top)..tile(samples.bottom) + 1);
+        let tile = |pixel: i32, first: i32| (pixel - first) as u32 / TILE_PX;
+        let PixelRect { left, top, .. } = grid.window;
+        let columns = tile(samples.left, left)..tile(samples.right, left) + 1;
+        let rows = tile(samples.top, top)..tile(samples.bottom, top) + 1;
         if columns.len() == 1 && rows.len() == 1 {
             self.pairs.push((rows.start * grid.columns + columns.start, record));
         } else {
@@ -161,8 +178,13 @@ impl Bins {
     }
 
     /// Adds how many records each tile has.
-    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
-        add_counts(&self.starts, counts);
+    pub(crate) fn add_counts(&self, counts: &mut [u64]) {
+        add_counts(&self.starts, 1, counts);
+    }
+
+    /// Adds how many bytes each tile needs, `record_bytes` for each record.
+    pub(crate) fn add_bytes(&self, record_bytes: usize, bytes: &mut [u64]) {
+        add_counts(&self.starts, record_bytes + size_of::<(u32, u32)>() + 4, bytes);
     }
 
     /// Bytes held.

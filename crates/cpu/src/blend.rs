@@ -4,9 +4,9 @@ use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
 use glam::{Vec3, Vec4};
 use pellucid_core::composite::Composite;
 
-use crate::bin::TILE_PX;
+use crate::fragments::COLOR;
 use crate::order::{STRIP, Strip};
-use crate::tile::{FrameParts, SURFACE, TILE_SAMPLES, TileCapture};
+use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
 /// The layers of a strip's pixels blended so far.
 struct StripComposite<S: Simd> {
@@ -60,20 +60,17 @@ impl TileCapture {
     fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>) -> StripComposite<S> {
         let zero = f32x8::splat(simd, 0.0);
         let mut blended = StripComposite { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) };
-        let (lights, sources) = self.fragments.lights_and_sources();
+        let (lights, sources, colors) = self.fragments.lights_and_sources();
         for row in self.order.rows(strip) {
             let numbers = row.0.map(|key| key as u32 as usize);
             let mut layer = [[0.0; STRIP]; 4];
-            let transmittance: [f32; STRIP] = blended.transmittance.into();
             for (lane, &number) in numbers.iter().enumerate() {
                 let source = sources[number];
-                let color = if source & SURFACE == 0 {
+                let color = if source & COLOR == 0 {
                     let (color, light) = (frame.palette[source as usize], lights[number]);
                     color * Vec4::new(light, light, light, 1.0)
-                } else if transmittance[lane] > 0.0 {
-                    self.surface_color(source, strip.samples[lane], frame)
                 } else {
-                    Vec4::ZERO
+                    colors[(source & !COLOR) as usize]
                 };
                 for (channel, value) in layer.iter_mut().zip(color.to_array()) {
                     channel[lane] = value;
@@ -86,12 +83,5 @@ impl TileCapture {
             }
         }
         blended
-    }
-
-    #[inline(never)]
-    fn surface_color(&self, source: u32, sample: u16, frame: FrameParts<'_>) -> Vec4 {
-        let sample = i32::from(sample);
-        let (x, y) = (self.rect.left + sample % TILE_PX as i32, self.rect.top + sample / TILE_PX as i32);
-        self.surfaces.color(source & !SURFACE, x, y, frame.draws).unwrap_or(Vec4::ZERO)
     }
 }

@@ -1,6 +1,13 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
+use glam::Vec4;
+
+use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
+
+/// Where the colour of a fragment comes from: 0 for none, the number of a draw plus 1, in whose palette colour it is lit,
+/// or with this bit set a place among the colours of those that are lit already.
+pub(crate) const COLOR: u32 = 1 << 30;
 
 /// Fragments in draw order. Numbers start at 1, so that 0 can stand for none.
 #[derive(Debug)]
@@ -12,6 +19,8 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
+    /// Colours of those that were shaded when they were captured.
+    colors: Vec<Vec4>,
 }
 
 /// One of them.
@@ -20,7 +29,7 @@ pub(crate) struct TileFragment {
     pub(crate) depth: f32,
     /// Brightness, where the source does not know.
     pub(crate) light: f32,
-    /// Where its colour comes from, see [`SURFACE`](crate::tile::SURFACE).
+    /// Where its colour comes from, see [`COLOR`].
     pub(crate) source: u32,
     pub(crate) primitive: u32,
 }
@@ -43,6 +52,7 @@ impl Default for Fragments {
             lights: Vec::new(),
             sources: Vec::new(),
             primitives: Vec::new(),
+            colors: Vec::new(),
         };
         fragments.make_room(1);
         fragments
@@ -52,6 +62,7 @@ impl Default for Fragments {
 impl Fragments {
     pub(crate) fn clear(&mut self) {
         self.end = 1;
+        self.colors.clear();
     }
 
     #[inline(always)]
@@ -101,6 +112,41 @@ impl Fragments {
         self.end += 1;
     }
 
+    /// The samples and lights of the vector of fragments that begins at a number, of which some may not be there.
+    #[inline(always)]
+    pub(crate) fn lanes(&mut self, first: usize) -> (&[u32; SHADED_LANES], &[f32; SHADED_LANES]) {
+        if self.depths.len() < first + SHADED_LANES {
+            self.grow(SHADED_LANES);
+        }
+        (
+            self.samples[first..].first_chunk().unwrap_or(&[0; SHADED_LANES]),
+            self.lights[first..].first_chunk().unwrap_or(&[0.0; SHADED_LANES]),
+        )
+    }
+
+    /// Gives the fragment of number `from` a colour that is lit already, and the number `to`, which is not higher.
+    #[inline(always)]
+    pub(crate) fn shaded(&mut self, from: usize, to: usize, color: Vec4) {
+        self.samples[to] = self.samples[from];
+        self.depths[to] = self.depths[from];
+        self.lights[to] = 1.0;
+        self.sources[to] = self.colors.len() as u32 | COLOR;
+        self.primitives[to] = self.primitives[from];
+        self.colors.push(color);
+    }
+
+    /// The number that the next fragment gets.
+    #[inline(always)]
+    pub(crate) fn end(&self) -> usize {
+        self.end
+    }
+
+    /// Leaves out the fragments from a number on.
+    #[inline(always)]
+    pub(crate) fn truncate(&mut self, end: usize) {
+        self.end = end;
+    }
+
     #[inline(always)]
     pub(crate) fn extend(&mut self, small: &[SmallFragment], samples: &[u16]) {
         if small.is_empty() {
@@ -128,10 +174,10 @@ impl Fragments {
         (&self.samples[..self.end], &self.depths[..self.end])
     }
 
-    /// Brightness and source of each; number 0 among them, dark and without source.
+    /// Brightness and source of each, number 0 among them, dark and without source; and the colours of those shaded.
     #[inline(always)]
-    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32]) {
-        (&self.lights[..self.end], &self.sources[..self.end])
+    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32], &[Vec4]) {
+        (&self.lights[..self.end], &self.sources[..self.end], &self.colors)
     }
 
     #[inline(always)]
@@ -145,8 +191,13 @@ impl Fragments {
         }
     }
 
+    /// The colours of those shaded.
+    pub(crate) fn colors(&self) -> &[Vec4] {
+        &self.colors
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.depths.capacity() * 20
+        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<Vec4>()
     }
 }

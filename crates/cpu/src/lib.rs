@@ -9,15 +9,18 @@ mod bin;
 mod blend;
 pub mod fbuffer;
 mod fragments;
+mod networks;
 mod order;
 mod raster;
 mod renderer;
 mod setup;
+mod shade;
 mod sight;
 pub mod simd;
 mod small;
 mod surfaces;
 mod tile;
 mod transform;
+mod window;
 
 pub use renderer::CpuRenderer;

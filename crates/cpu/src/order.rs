@@ -1,24 +1,22 @@
 //! Fragments into order: those of each pixel side by side, nearest first.
 //!
-//! Eight pixels are sorted at a time, a pixel to a lane: pixels of about equally many fragments are put together into a
-//! *strip*, whose row `i` holds the `i`-th key of each, and sorting networks compare whole rows. Networks take no branches
-//! that depend on the keys; insertion sort (LFB chapter, section 20.4.1), pixel by pixel, takes one mispredicted branch for
-//! each pixel and about one for each fragment, which costs more than all its comparisons.
+//! Eight pixels are sorted at a time, a pixel to a lane: neighbours of few fragments, or pixels of about equally many, are
+//! put together into a *strip*, whose row `i` holds the `i`-th key of each, and sorting networks compare whole rows.
+//! Networks take no branches that depend on the keys; insertion sort (LFB chapter, section 20.4.1), pixel by pixel, takes
+//! one mispredicted branch for each pixel and about one for each fragment, which costs more than all its comparisons.
 //!
 //! A key is a fragment's depth above its number in the tile. As fragments are numbered in draw order, this orders like the
 //! contract's order key. Keys are positive and look like f64 numbers of the same order, and of those every SIMD level has
 //! maximum and minimum.
 
-use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, f64x8, u64x8};
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::fragments::Fragments;
+use crate::networks::{BLOCK, Permutation, sort_rows};
 use crate::tile::{FragmentCounts, TILE_SAMPLES};
 
 /// Pixels of a strip.
 pub(crate) const STRIP: usize = 8;
-
-/// Rows that a network sorts in registers.
-const BLOCK: usize = 8;
 
 /// The order of a tile's fragments.
 #[derive(Debug)]
@@ -29,6 +27,8 @@ pub(crate) struct Order {
     pub(crate) strips: Vec<Strip>,
     /// Rows of all strips. Where a pixel has fewer fragments than its strip has rows, the last ones are 0.
     keys: Vec<Row>,
+    /// How the last strip of many rows was brought into order.
+    last: Permutation,
 }
 
 /// A key of each of a strip's pixels. One cache line, so that no vector lies in two.
@@ -36,7 +36,7 @@ pub(crate) struct Order {
 #[repr(align(64))]
 pub(crate) struct Row(pub(crate) [u64; STRIP]);
 
-/// Eight pixels of about equally many fragments.
+/// Eight pixels: neighbours, or of about equally many fragments.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Strip {
     first_row: u32,
@@ -49,7 +49,13 @@ pub(crate) struct Strip {
 
 impl Default for Order {
     fn default() -> Self {
-        Self { counts: vec![0; TILE_SAMPLES], firsts: vec![0; TILE_SAMPLES], strips: Vec::new(), keys: Vec::new() }
+        Self {
+            counts: vec![0; TILE_SAMPLES],
+            firsts: vec![0; TILE_SAMPLES],
+            strips: Vec::new(),
+            keys: Vec::new(),
+            last: Permutation::default(),
+        }
     }
 }
 
@@ -91,6 +97,7 @@ impl Order {
             rows[row].0[lane] = u64::from(depth.to_bits()) << 32 | number as u64;
             *place += STRIP as u32;
         }
+        self.last.begin(fragments.len() + 1);
         dispatch!(level, simd => self.sort_strips(simd));
         totals
     }
@@ -102,15 +109,49 @@ impl Order {
             for (lane, &sample) in strip.samples[..strip.sample_count as usize].iter().enumerate() {
                 self.firsts[sample as usize] = (first * STRIP + lane) as u32;
             }
-            sort_rows(simd, &mut self.keys[first..first + count]);
+            sort_rows(simd, &mut self.keys[first..first + count], &mut self.last);
         }
     }
 
-    /// Puts the samples that have fragments together into strips; returns how many rows these have.
+    /// Puts the samples that have fragments together into strips; returns how many rows these have. Neighbours that have
+    /// few are a strip, however few; others are first sorted by how many.
     fn make_strips(&mut self, totals: &mut FragmentCounts) -> usize {
+        let mut row_count = 0;
+        let mut many = [0u16; TILE_SAMPLES / STRIP];
+        let mut many_count = 0;
+        for (group, counts) in self.counts.as_chunks::<STRIP>().0.iter().enumerate() {
+            let greatest = counts.iter().fold(0, |greatest, &count| greatest.max(count));
+            if greatest == 0 {
+                continue;
+            }
+            totals.covered_pixels += counts.iter().map(|&count| u64::from(count > 0)).sum::<u64>();
+            totals.greatest = totals.greatest.max(greatest);
+            if greatest as usize > BLOCK {
+                many[many_count] = group as u16;
+                many_count += 1;
+                continue;
+            }
+            let first = group * STRIP;
+            let samples = std::array::from_fn(|lane| (first + lane) as u16);
+            for (lane, key) in self.firsts[first..first + STRIP].iter_mut().enumerate() {
+                *key = (row_count * STRIP + lane) as u32;
+            }
+            let strip = Strip { first_row: row_count as u32, row_count: greatest, samples, sample_count: STRIP as u32 };
+            self.strips.push(strip);
+            row_count += greatest as usize;
+        }
+        if many_count > 0 {
+            row_count = self.make_strips_by_count(&many[..many_count], row_count);
+        }
+        row_count
+    }
+
+    /// Puts the samples of groups of neighbours together by how many fragments they have.
+    fn make_strips_by_count(&mut self, groups: &[u16], mut row_count: usize) -> usize {
+        let samples = || groups.iter().flat_map(|&group| (0..STRIP).map(move |lane| group as usize * STRIP + lane));
         let mut starts = [0u16; CLASSES];
-        for &count in &self.counts {
-            starts[class(count)] += 1;
+        for sample in samples() {
+            starts[class(self.counts[sample])] += 1;
         }
         // Most fragments last; samples without any are left out.
         let mut start = 0;
@@ -118,29 +159,27 @@ impl Order {
         for place in &mut starts {
             start += std::mem::replace(place, start);
         }
-        let covered = start as usize;
         let mut by_class = [0u16; TILE_SAMPLES];
-        for (sample, &count) in self.counts.iter().enumerate() {
+        for sample in samples() {
+            let count = self.counts[sample];
             if count > 0 {
                 let place = &mut starts[class(count)];
                 by_class[*place as usize] = sample as u16;
                 *place += 1;
             }
         }
-        totals.covered_pixels = covered as u64;
-        let mut first_row = 0;
-        for samples in by_class[..covered].chunks(STRIP) {
+        for samples in by_class[..start as usize].chunks(STRIP) {
+            let first_row = row_count as u32;
             let mut strip = Strip { first_row, row_count: 0, samples: [0; STRIP], sample_count: samples.len() as u32 };
             for (lane, &sample) in samples.iter().enumerate() {
                 strip.samples[lane] = sample;
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);
-                self.firsts[sample as usize] = first_row * STRIP as u32 + lane as u32;
+                self.firsts[sample as usize] = (row_count * STRIP + lane) as u32;
             }
-            totals.greatest = totals.greatest.max(strip.row_count);
-            first_row += strip.row_count;
+            row_count += strip.row_count as usize;
             self.strips.push(strip);
         }
-        first_row as usize
+        row_count
     }
 
     /// The rows of a strip: in each the number of a fragment of every pixel in the low half of a key, 0 for none.
@@ -158,112 +197,9 @@ impl Order {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.keys.capacity() * size_of::<Row>() + self.strips.capacity() * size_of::<Strip>() + TILE_SAMPLES * 8
+        self.keys.capacity() * size_of::<Row>()
+            + self.strips.capacity() * size_of::<Strip>()
+            + TILE_SAMPLES * 8
+            + self.last.bytes()
     }
-}
-
-/// Sorts every column of `rows`, greatest first: blocks by networks, which are then merged.
-#[inline(always)]
-fn sort_rows<S: Simd>(simd: S, rows: &mut [Row]) {
-    if rows.len() > BLOCK {
-        if is_sorted(simd, rows.iter()) {
-            return;
-        }
-        if is_sorted(simd, rows.iter().rev()) {
-            rows.reverse();
-            return;
-        }
-    }
-    for block in rows.chunks_mut(BLOCK) {
-        match block.len() {
-            0 | 1 => {}
-            2 => sort_2(simd, block),
-            3 | 4 => sort_4(simd, block),
-            _ => sort_8(simd, block),
-        }
-    }
-    let mut sorted = BLOCK;
-    while sorted < rows.len() {
-        for pair in rows.chunks_mut(2 * sorted).filter(|pair| pair.len() > sorted) {
-            merge(simd, pair, sorted);
-        }
-        sorted *= 2;
-    }
-}
-
-#[inline(always)]
-fn load<S: Simd>(simd: S, row: &Row) -> f64x8<S> {
-    u64x8::load_array_ref(simd, &row.0).bitcast()
-}
-
-#[inline(always)]
-fn store<S: Simd>(keys: f64x8<S>, row: &mut Row) {
-    keys.bitcast::<u64x8<S>>().store_array(&mut row.0);
-}
-
-/// Sorts up to so many rows in registers by Batcher's odd-even merge sort (1968).
-macro_rules! network {
-    ($name:ident, $count:literal, $($near:literal $far:literal),*) => {
-        #[inline(always)]
-        fn $name<S: Simd>(simd: S, rows: &mut [Row]) {
-            let mut sorted = [f64x8::splat(simd, 0.0); $count];
-            for (keys, row) in sorted.iter_mut().zip(rows.iter()) {
-                *keys = load(simd, row);
-            }
-            $(
-                let (a, b) = (sorted[$near], sorted[$far]);
-                (sorted[$near], sorted[$far]) = (a.max(b), a.min(b));
-            )*
-            for (row, keys) in rows.iter_mut().zip(sorted) {
-                store(keys, row);
-            }
-        }
-    };
-}
-
-network!(sort_2, 2, 0 1);
-network!(sort_4, 4, 0 1, 2 3, 0 2, 1 3, 1 2);
-network!(
-    sort_8,
-    8,
-    0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6
-);
-
-/// Merges `sorted` sorted rows, a power of two, with the sorted rest: Batcher's odd-even merge, without the comparisons
-/// that reach beyond the last row, which could only move a 0.
-#[inline(always)]
-fn merge<S: Simd>(simd: S, rows: &mut [Row], sorted: usize) {
-    let (near, far) = rows.split_at_mut(sorted);
-    exchange(simd, near, far);
-    let mut step = sorted / 2;
-    while step >= 1 {
-        for pair in rows[step..].chunks_mut(2 * step).filter(|pair| pair.len() > step) {
-            let (near, far) = pair.split_at_mut(step);
-            exchange(simd, near, far);
-        }
-        step /= 2;
-    }
-}
-
-/// Compares and exchanges each of the rows in front with the one in the same place behind, if there is one.
-#[inline(always)]
-fn exchange<S: Simd>(simd: S, near: &mut [Row], far: &mut [Row]) {
-    for (near, far) in near.iter_mut().zip(far) {
-        let (a, b) = (load(simd, near), load(simd, far));
-        store(a.max(b), near);
-        store(a.min(b), far);
-    }
-}
-
-/// Whether all columns fall, as those of surfaces drawn in order do; or rise, seen from the other end.
-#[inline(always)]
-fn is_sorted<'r, S: Simd>(simd: S, mut rows: impl Iterator<Item = &'r Row>) -> bool {
-    let Some(first) = rows.next() else { return true };
-    let mut last = load(simd, first);
-    rows.all(|row| {
-        let this = load(simd, row);
-        let falls = this.simd_le(last).all_true();
-        last = this;
-        falls
-    })
 }

@@ -1,7 +1,8 @@
 //! One frame, top to bottom.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use fearless_simd::{Level, dispatch};
 use glam::Vec4;
@@ -13,16 +14,18 @@ use pellucid_core::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::bin::{TILE_PX, TileGrid};
+use crate::bin::{PixelRect, TILE_PX, TileGrid};
 use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
 use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
 use crate::transform::{Vertices, groups};
+use crate::window::{DEFAULT_BUDGET_BYTES, Windows};
 
 /// Renders on all cores. Keep it from frame to frame: it holds on to its threads and memory.
 #[derive(Debug)]
 pub struct CpuRenderer {
     threads: usize,
     level: Level,
+    budget_bytes: usize,
     pool: OnceLock<ThreadPool>,
     memory: Mutex<Memory>,
 }
@@ -34,6 +37,16 @@ struct Memory {
     scratches: Vec<SetupScratch>,
     chunks: Vec<Chunk>,
     workers: Vec<Worker>,
+    last: LastFrame,
+}
+
+/// How the last frame was cut.
+#[derive(Debug, Default)]
+struct LastFrame {
+    viewport: Option<Viewport>,
+    windows: Vec<PixelRect>,
+    /// What all its windows held together.
+    bytes: usize,
 }
 
 /// What one thread needs to turn one tile after another into pixels.
@@ -57,21 +70,33 @@ impl Default for TileBuffers {
     }
 }
 
-/// A scene's triangles in the bins of its tiles.
-struct Binned<'a> {
+/// A frame that is being rendered.
+struct Run<'a> {
     draws: Vec<Draw<'a>>,
     palette: Vec<Vec4>,
-    grid: TileGrid,
-    chunks: Vec<Chunk>,
+    viewport: Viewport,
     level: Level,
+    budget_bytes: usize,
+    triangles: u64,
+    /// Wall-clock milliseconds of each of [`STEPS`].
+    steps_ms: [f64; STEPS.len()],
     stats: Stats,
     start: Instant,
 }
 
+/// The steps of a frame. Those of tiles run side by side: what they took together is shared out.
+const STEPS: [&str; 5] = ["transform", "clip, setup and bin", "raster", "order", "shade and resolve"];
+
 impl CpuRenderer {
     /// A renderer on this many threads; 0: one for each core. They are started with the first frame.
     pub fn new(threads: usize) -> Self {
-        Self { threads, level: Level::new(), pool: OnceLock::new(), memory: Mutex::default() }
+        Self {
+            threads,
+            level: Level::new(),
+            budget_bytes: DEFAULT_BUDGET_BYTES,
+            pool: OnceLock::new(),
+            memory: Mutex::default(),
+        }
     }
 
     /// The same renderer at another SIMD level than the best of this machine, see [`simd::levels`](crate::simd::levels).
@@ -82,19 +107,26 @@ impl CpuRenderer {
         self
     }
 
+    /// The same renderer with a budget: bytes that it may hold between setting triangles up and capturing tiles. The
+    /// picture is cut into as many windows as that takes; it is the same at any budget.
+    #[must_use]
+    pub fn budget_bytes(mut self, budget_bytes: u64) -> Self {
+        self.budget_bytes = usize::try_from(budget_bytes).unwrap_or(usize::MAX);
+        self
+    }
+
     /// Renders a view.
     ///
     /// # Errors
     /// If the view is invalid or the threads cannot be started.
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
         self.run(|memory| {
-            let mut binned = bin_scene(scene, view, self.level, memory)?;
+            let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
             let mut image = filled(view);
             let bands: Vec<Mutex<&mut [Vec4]>> =
                 image.pixels_mut().chunks_mut(TILE_PX as usize * view.width as usize).map(Mutex::new).collect();
             let resolver = PixelResolver::new(resolve, view);
-            let frame = binned.parts();
-            let (counts, bytes) = for_each_tile(&binned, memory, |number, capture, buffers| {
+            run.for_each_tile(memory, |frame, capture, buffers| {
                 if resolve == Resolve::Blend {
                     if capture.fragments.len() == 0 && !capture.has_opaque {
                         return;
@@ -108,34 +140,35 @@ impl CpuRenderer {
                         buffers.pixels[sample] = resolver.pixel(layers.pixel(x, y), layers.opaque(x, y));
                     }
                 }
-                let left = capture.rect.left as usize;
-                let width = (capture.rect.right - capture.rect.left + 1) as usize;
-                let mut band = lock(&bands[(number / binned.grid.columns) as usize]);
-                for (to, from) in band.chunks_mut(view.width as usize).zip(buffers.pixels.chunks(TILE_PX as usize)) {
+                let PixelRect { left, top, right, bottom } = capture.rect;
+                let (left, width) = (left as usize, (right - left + 1) as usize);
+                let (band, first_row) = (top as usize / TILE_PX as usize, top as usize % TILE_PX as usize);
+                let mut band = lock(&bands[band]);
+                let rows = band.chunks_mut(view.width as usize).skip(first_row).take((bottom - top + 1) as usize);
+                for (to, from) in rows.zip(buffers.pixels.chunks(TILE_PX as usize)) {
                     to[left..left + width].copy_from_slice(&from[..width]);
                 }
             });
             drop(bands);
-            let stats = binned.finish(counts, bytes, memory, scene);
+            let stats = run.finish();
             finish(resolve, &mut image, &stats);
             Ok(Frame { image, stats })
         })
     }
 
-    /// Hands out the ordered layers of a view, tile by tile, for a resolve of one's own. Tiles do not overlap and cover
-    /// the whole picture; they come from several threads in any order.
+    /// Hands out the ordered layers of a view, a part of the picture at a time, for a resolve of one's own. Parts do not
+    /// overlap and cover the whole picture; they come from several threads in any order.
     ///
     /// # Errors
     /// If the view is invalid or the threads cannot be started.
     pub fn layers(&self, scene: &Scene, view: &View, visit: impl Fn(&Layers) + Sync) -> Result<Stats, Error> {
         self.run(|memory| {
-            let mut binned = bin_scene(scene, view, self.level, memory)?;
-            let frame = binned.parts();
-            let (counts, bytes) = for_each_tile(&binned, memory, |_, capture, buffers| {
+            let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
+            run.for_each_tile(memory, |frame, capture, buffers| {
                 capture.layers(frame, &mut buffers.layers);
                 visit(&buffers.layers);
             });
-            Ok(binned.finish(counts, bytes, memory, scene))
+            Ok(run.finish())
         })
     }
 
@@ -159,81 +192,205 @@ impl CpuRenderer {
     }
 }
 
-/// Transforms, clips, sets up and bins all triangles.
-fn bin_scene<'a>(scene: &'a Scene, view: &View, level: Level, memory: &mut Memory) -> Result<Binned<'a>, Error> {
-    let start = Instant::now();
-    let draws = draws(scene, view)?;
-    let viewport = Viewport::of(view);
-    let grid = TileGrid::new(viewport);
-    let mut chunks = std::mem::take(&mut memory.chunks);
-    let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
-    let chunk_triangles = chunk_triangles(scene.primitive_count() as usize, rayon::current_num_threads());
-    let mut used = 0;
-    let (mut transform_ms, mut setup_ms) = (0.0, 0.0);
-    for group in groups(&draws) {
-        let transform_start = Instant::now();
-        let group_draws = &draws[group.draws.clone()];
-        memory.vertices.transform(group_draws, &viewport, level);
-        let setup_start = Instant::now();
-        let spans = chunk_spans(group_draws, group.draws.start, chunk_triangles);
-        if chunks.len() < used + spans.len() {
-            chunks.resize_with(used + spans.len(), Chunk::default);
-        }
-        let vertices = &memory.vertices;
-        chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
-            let draw_vertices = |draw: usize| vertices.draw(draw - group.draws.start);
-            let mut scratch = lock(&scratches).pop().unwrap_or_default();
-            dispatch!(level, simd => chunk.fill(simd, spans, &draws, draw_vertices, &grid, &mut scratch));
-            lock(&scratches).push(scratch);
-        });
-        used += spans.len();
-        transform_ms += (setup_start - transform_start).as_secs_f64() * 1e3;
-        setup_ms += setup_start.elapsed().as_secs_f64() * 1e3;
+impl<'a> Run<'a> {
+    fn new(scene: &'a Scene, view: &View, level: Level, budget_bytes: usize) -> Result<Self, Error> {
+        let start = Instant::now();
+        let draws = draws(scene, view)?;
+        let threads = rayon::current_num_threads();
+        let device = format!("CPU, {threads} thread{}", if threads == 1 { "" } else { "s" });
+        let mut stats = Stats::new(Technique::Cpu, device, view.width, view.height);
+        stats.triangles = u64::from(scene.primitive_count());
+        stats.windows = 0;
+        Ok(Self {
+            palette: std::iter::once(Vec4::ZERO).chain(draws.iter().map(|draw| draw.base_color)).collect(),
+            draws,
+            viewport: Viewport::of(view),
+            level,
+            budget_bytes,
+            triangles: stats.triangles,
+            steps_ms: [0.0; STEPS.len()],
+            stats,
+            start,
+        })
     }
-    chunks.truncate(used);
-    memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let threads = rayon::current_num_threads();
-    let device = format!("CPU, {threads} thread{}", if threads == 1 { "" } else { "s" });
-    let mut stats = Stats::new(Technique::Cpu, device, view.width, view.height);
-    stats.triangles = u64::from(scene.primitive_count());
-    stats.dropped_triangles = chunks.iter().map(|chunk| chunk.dropped_triangles).sum();
-    stats.steps =
-        vec![Step { name: "transform", ms: transform_ms }, Step { name: "clip, setup and bin", ms: setup_ms }];
-    let palette = std::iter::once(Vec4::ZERO).chain(draws.iter().map(|draw| draw.base_color)).collect();
-    Ok(Binned { draws, palette, grid, chunks, level, stats, start })
+
+    /// Captures every tile and hands it to `resolve`, on all threads, window by window.
+    fn for_each_tile(
+        &mut self,
+        memory: &mut Memory,
+        resolve: impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync,
+    ) {
+        let mut counts = FragmentCounts::default();
+        let mut windows = memory.windows(&self.viewport, self.budget_bytes);
+        let mut last = LastFrame { viewport: Some(self.viewport), ..LastFrame::default() };
+        while let Some(window) = windows.next() {
+            let grid = TileGrid::new(self.viewport, window);
+            let mut chunks = std::mem::take(&mut memory.chunks);
+            match self.set_up(&grid, memory, &mut chunks, grid.tile_count() == 1) {
+                Ok(dropped_triangles) => {
+                    self.stats.dropped_triangles = dropped_triangles;
+                    counts = counts.merged(self.capture_tiles(&grid, memory, &chunks, &resolve));
+                    last.bytes += chunks.iter().map(Chunk::bytes).sum::<usize>();
+                    last.windows.push(window);
+                }
+                Err(part) => {
+                    let mut bytes = vec![0; grid.tile_count()];
+                    for chunk in &chunks {
+                        chunk.opaque.add_bytes(&mut bytes);
+                        chunk.transparent.add_bytes(&mut bytes);
+                    }
+                    windows.cut(&grid, &bytes, part, self.budget_bytes);
+                }
+            }
+            // Chunks that held much of one window would add up with those that hold much of another.
+            if windows.is_empty() && last.windows.len() == 1 {
+                memory.chunks = chunks;
+            }
+        }
+        self.stats.windows = last.windows.len() as u32;
+        self.stats.fragments = counts.fragments;
+        self.stats.max_depth_complexity = counts.greatest;
+        self.stats.mean_depth_complexity = counts.fragments as f64 / counts.covered_pixels.max(1) as f64;
+        memory.last = last;
+    }
+
+    /// Transforms, clips, sets up and bins all triangles, as far as they reach a window. Returns how many had to be dropped,
+    /// or, if chunks hold more than the budget, which part of the triangles there is.
+    fn set_up(
+        &mut self,
+        grid: &TileGrid,
+        memory: &mut Memory,
+        chunks: &mut Vec<Chunk>,
+        is_single_tile: bool,
+    ) -> Result<u64, f64> {
+        let level = self.level;
+        let draws = &*self.draws;
+        let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
+        let chunk_triangles = chunk_triangles(self.triangles as usize, rayon::current_num_threads(), grid.tile_count());
+        let (budget_bytes, held_bytes) =
+            (if is_single_tile { usize::MAX } else { self.budget_bytes }, AtomicUsize::new(0));
+        let triangles_done = AtomicUsize::new(0);
+        let mut used = 0;
+        for group in groups(draws) {
+            let transform_start = Instant::now();
+            let group_draws = &draws[group.draws.clone()];
+            memory.vertices.transform(group_draws, &self.viewport, level);
+            let setup_start = Instant::now();
+            let spans = chunk_spans(group_draws, group.draws.start, chunk_triangles);
+            if chunks.len() < used + spans.len() {
+                chunks.resize_with(used + spans.len(), Chunk::default);
+            }
+            let vertices = &memory.vertices;
+            chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
+                if held_bytes.load(Ordering::Relaxed) > budget_bytes {
+                    *chunk = Chunk::default();
+                    return;
+                }
+                let draw_vertices = |draw: usize| vertices.draw(draw - group.draws.start);
+                let mut scratch = lock(&scratches).pop().unwrap_or_default();
+                dispatch!(level, simd => chunk.fill(simd, spans, draws, draw_vertices, grid, &mut scratch));
+                lock(&scratches).push(scratch);
+                held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
+                triangles_done.fetch_add(spans.iter().map(|span| span.count).sum(), Ordering::Relaxed);
+            });
+            used += spans.len();
+            self.steps_ms[0] += (setup_start - transform_start).as_secs_f64() * 1e3;
+            self.steps_ms[1] += setup_start.elapsed().as_secs_f64() * 1e3;
+            if held_bytes.load(Ordering::Relaxed) > budget_bytes {
+                break;
+            }
+        }
+        chunks.truncate(used);
+        memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let bytes = held_bytes.into_inner();
+        let scratch_bytes: usize = memory.scratches.iter().map(SetupScratch::bytes).sum();
+        self.note_bytes(bytes + scratch_bytes + memory.vertices.bytes());
+        if bytes > budget_bytes {
+            return Err(triangles_done.into_inner() as f64 / self.triangles as f64);
+        }
+        Ok(chunks.iter().map(|chunk| chunk.dropped_triangles).sum())
+    }
+
+    /// Captures the tiles of a window and hands them to `resolve`, the dearest first. Returns the figures of all.
+    fn capture_tiles(
+        &mut self,
+        grid: &TileGrid,
+        memory: &mut Memory,
+        chunks: &[Chunk],
+        resolve: &(impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync),
+    ) -> FragmentCounts {
+        let start = Instant::now();
+        let frame = FrameParts { chunks, draws: &self.draws, palette: &self.palette, grid, level: self.level };
+        let (mut records, mut small) = (vec![0; grid.tile_count()], vec![0; grid.tile_count()]);
+        for bins in chunks.iter().flat_map(|chunk| [&chunk.opaque, &chunk.transparent]) {
+            bins.records.add_counts(&mut records);
+            bins.small.add_counts(&mut small);
+        }
+        let mut tiles: Vec<u32> = (0..grid.tile_count() as u32).collect();
+        tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(records[tile as usize] + small[tile as usize]));
+        let spare = Mutex::new(std::mem::take(&mut memory.workers));
+        let next = AtomicUsize::new(0);
+        let results = Mutex::new((FragmentCounts::default(), [Duration::ZERO; 3], 0));
+        rayon::broadcast(|_| {
+            let mut worker = lock(&spare).pop().unwrap_or_default();
+            let mut counts = FragmentCounts::default();
+            let mut times = [Duration::ZERO; 3];
+            while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let mut started = Instant::now();
+                let rows = frame.band_rows(tile, records[tile as usize], small[tile as usize]);
+                for first in (0..grid.tile_rows(tile)).step_by(rows as usize) {
+                    worker.capture.capture(tile, [first, rows], frame);
+                    let captured = Instant::now();
+                    counts = counts.merged(worker.capture.sort(frame));
+                    let ordered = Instant::now();
+                    resolve(frame, &worker.capture, &mut worker.buffers);
+                    let resolved = Instant::now();
+                    let new = [captured - started, ordered - captured, resolved - ordered];
+                    for (time, new) in times.iter_mut().zip(new) {
+                        *time += new;
+                    }
+                    started = resolved;
+                }
+            }
+            let mut results = lock(&results);
+            results.0 = results.0.merged(counts);
+            for (sum, time) in results.1.iter_mut().zip(times) {
+                *sum += time;
+            }
+            results.2 += worker.capture.bytes() + worker.buffers.layers.fragments.capacity() * size_of::<Fragment>();
+            lock(&spare).push(worker);
+        });
+        memory.workers = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let (counts, times, capture_bytes) = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let (elapsed, sum) = (start.elapsed().as_secs_f64() * 1e3, times.iter().sum::<Duration>().as_secs_f64());
+        for (step_ms, time) in self.steps_ms[2..].iter_mut().zip(times) {
+            *step_ms += elapsed * time.as_secs_f64() / sum.max(f64::MIN_POSITIVE);
+        }
+        let chunk_bytes: usize = chunks.iter().map(Chunk::bytes).sum();
+        self.note_bytes(chunk_bytes + memory.vertices.bytes() + capture_bytes);
+        counts
+    }
+
+    /// Keeps the most bytes held at once.
+    fn note_bytes(&mut self, bytes: usize) {
+        self.stats.peak_bytes = self.stats.peak_bytes.max(bytes as u64);
+    }
+
+    /// The figures of the frame.
+    fn finish(mut self) -> Stats {
+        self.stats.total_ms = self.start.elapsed().as_secs_f64() * 1e3;
+        self.stats.steps = STEPS.iter().zip(self.steps_ms).map(|(name, ms)| Step { name, ms }).collect();
+        self.stats
+    }
 }
 
-/// Captures every tile and hands it to `resolve`, on all threads, the dearest tiles first. Returns the figures of all and
-/// the bytes that captures held.
-fn for_each_tile(
-    binned: &Binned<'_>,
-    memory: &mut Memory,
-    resolve: impl Fn(u32, &TileCapture, &mut TileBuffers) + Sync,
-) -> (FragmentCounts, usize) {
-    let mut costs = vec![0; binned.grid.tile_count()];
-    for chunk in &binned.chunks {
-        chunk.opaque.add_counts(&mut costs);
-        chunk.transparent.add_counts(&mut costs);
+impl Memory {
+    /// The windows of the last frame, if they are likely to fit this one better than the whole picture.
+    fn windows(&mut self, viewport: &Viewport, budget_bytes: usize) -> Windows {
+        let last = std::mem::take(&mut self.last);
+        let is_like_last = last.viewport == Some(*viewport) && last.bytes > budget_bytes;
+        Windows::new(if is_like_last { last.windows } else { vec![PixelRect::all(viewport)] })
     }
-    let mut tiles: Vec<u32> = (0..binned.grid.tile_count() as u32).collect();
-    tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(costs[tile as usize]));
-    let spare = Mutex::new(std::mem::take(&mut memory.workers));
-    let next = std::sync::atomic::AtomicUsize::new(0);
-    let results = Mutex::new((FragmentCounts::default(), 0));
-    rayon::broadcast(|_| {
-        let mut worker = lock(&spare).pop().unwrap_or_default();
-        let mut counts = FragmentCounts::default();
-        while let Some(&tile) = tiles.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed)) {
-            counts = counts.merged(worker.capture.capture(tile, binned.parts()));
-            resolve(tile, &worker.capture, &mut worker.buffers);
-        }
-        let mut results = lock(&results);
-        results.0 = results.0.merged(counts);
-        results.1 += worker.capture.bytes() + worker.buffers.layers.fragments.capacity() * size_of::<Fragment>();
-        lock(&spare).push(worker);
-    });
-    memory.workers = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
-    results.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What a mutex guards. A panic elsewhere ends the frame anyway.
@@ -246,34 +403,4 @@ fn filled(view: &View) -> Image {
     let background = view.background;
     let pixels = (0..view.width as usize * view.height as usize).into_par_iter().with_min_len(1 << 15);
     Image::from_pixels(view.width, view.height, pixels.map(|_| background).collect())
-}
-
-impl Binned<'_> {
-    fn parts(&self) -> FrameParts<'_> {
-        FrameParts {
-            chunks: &self.chunks,
-            draws: &self.draws,
-            palette: &self.palette,
-            grid: &self.grid,
-            level: self.level,
-        }
-    }
-
-    /// Completes the figures and gives the memory back.
-    fn finish(&mut self, counts: FragmentCounts, capture_bytes: usize, memory: &mut Memory, scene: &Scene) -> Stats {
-        debug_assert_eq!(self.stats.triangles, u64::from(scene.primitive_count()));
-        let mut stats = self.stats.clone();
-        let total_ms = self.start.elapsed().as_secs_f64() * 1e3;
-        let before: f64 = stats.steps.iter().map(|step| step.ms).sum();
-        stats.steps.push(Step { name: "raster, sort, shade and resolve", ms: total_ms - before });
-        stats.total_ms = total_ms;
-        stats.fragments = counts.fragments;
-        stats.max_depth_complexity = counts.greatest;
-        stats.mean_depth_complexity = counts.fragments as f64 / counts.covered_pixels.max(1) as f64;
-        let chunk_bytes: usize = self.chunks.iter().map(Chunk::bytes).sum();
-        let scratch_bytes: usize = memory.scratches.iter().map(SetupScratch::bytes).sum();
-        stats.peak_bytes = (chunk_bytes + scratch_bytes + memory.vertices.bytes() + capture_bytes) as u64;
-        memory.chunks = std::mem::take(&mut self.chunks);
-        stats
-    }
 }

@@ -52,10 +52,10 @@ pub(crate) struct PassBins {
 }
 
 impl PassBins {
-    /// Adds how much each tile has to do.
-    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
-        self.records.add_counts(counts);
-        self.small.add_counts(counts);
+    /// Adds how many bytes each tile needs.
+    pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
+        self.records.add_bytes(size_of::<Record>(), bytes);
+        self.small.add_bytes(bytes);
     }
 
     fn bytes(&self) -> usize {
@@ -90,8 +90,9 @@ pub(crate) struct Span {
 
 /// Triangles in a chunk: enough for each thread to get many, so that all end at about the same time, but not so many that
 /// what is between set-up and tiles leaves the second-level cache, nor so few that tiles find little in each.
-pub(crate) fn chunk_triangles(total: usize, threads: usize) -> usize {
-    (total / (threads * 16)).clamp(1024, 16_384)
+pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize) -> usize {
+    // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
+    (total / (threads * 16)).clamp(1024, 16_384.max(2 * tiles))
 }
 
 /// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.

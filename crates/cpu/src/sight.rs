@@ -17,13 +17,13 @@ const BLOCKS: usize = 4;
 
 /// What is known of sixteen triangles; a bit for each in a mask.
 pub(crate) struct Sight {
-    /// Small ones that cover samples, unless those are all beside the picture.
+    /// Small ones that cover samples, unless those are all beside the window.
     pub(crate) small: u32,
     /// Others that may be in sight: large ones, and those with a corner that cannot be projected.
     pub(crate) others: u32,
     /// Small ones that run counter-clockwise on the screen.
     pub(crate) swapped: u32,
-    /// First sample of the small ones' bounds, on the picture.
+    /// First sample of the small ones' bounds, in the window.
     pub(crate) left: [i32; LANES],
     pub(crate) top: [i32; LANES],
     width: [i32; LANES],
@@ -45,9 +45,9 @@ impl Sight {
         let outside = ax.simd_eq(OUTSIDE) | bx.simd_eq(OUTSIDE) | cx.simd_eq(OUTSIDE);
         let (min_x, min_y) = (ax.min(bx).min(cx), ay.min(by).min(cy));
         let (max_x, max_y) = (ax.max(bx).max(cx), ay.max(by).max(cy));
-        let (left, top) = (first_sample(min_x), first_sample(min_y));
-        let right = last_sample(max_x, grid.viewport.width);
-        let bottom = last_sample(max_y, grid.viewport.height);
+        let (left, top) = (first_sample(min_x, grid.window.left), first_sample(min_y, grid.window.top));
+        let right = last_sample(max_x, grid.window.right);
+        let bottom = last_sample(max_y, grid.window.bottom);
         let hit = left.simd_le(right) & top.simd_le(bottom) & !outside;
         let is_small = (max_x - min_x).simd_lt(SMALL_SUBPIXELS) & (max_y - min_y).simd_lt(SMALL_SUBPIXELS);
         let others = (hit & !is_small) | outside;
@@ -97,7 +97,7 @@ impl Sight {
     }
 
     /// The blocks that a small triangle reaches, row by row: the first sample of each, and which of its samples are
-    /// covered and on the picture, a bit for each.
+    /// covered and in the window, a bit for each.
     #[inline(always)]
     pub(crate) fn blocks(&self, lane: usize) -> [([i32; 2], u64); BLOCKS] {
         let mut blocks = [([0; 2], 0); BLOCKS];
@@ -106,11 +106,11 @@ impl Sight {
                 let (across, down) = (block_column as i32 * BLOCK_PX, block_row as i32 * BLOCK_PX);
                 let [low, high] = &self.halves[block_row * 2 + block_column];
                 let covered = u64::from(low[lane] as u32) | u64::from(high[lane] as u32) << 32;
-                // Beyond the bounds there are no samples, but beyond the picture there may be.
+                // Beyond the bounds there are no samples, but beyond the window there may be.
                 let (columns, rows) = (self.width[lane] - across, self.height[lane] - down);
-                let on_picture = columns_mask(columns) & rows_mask(rows);
+                let in_window = columns_mask(columns) & rows_mask(rows);
                 let first = [self.left[lane] + across, self.top[lane] + down];
-                blocks[block_row * 2 + block_column] = (first, covered & on_picture);
+                blocks[block_row * 2 + block_column] = (first, covered & in_window);
             }
         }
         blocks
@@ -170,16 +170,16 @@ fn cover_block<S: Simd>(
     halves
 }
 
-/// The first sample of the picture at or after a coordinate.
+/// The first sample at or after a coordinate, from the window's first on.
 #[inline(always)]
-fn first_sample<S: Simd>(subpixels: i32x16<S>) -> i32x16<S> {
-    ((subpixels + (SUBPIXELS / 2 - 1)) >> 8).max(0)
+fn first_sample<S: Simd>(subpixels: i32x16<S>, first: i32) -> i32x16<S> {
+    ((subpixels + (SUBPIXELS / 2 - 1)) >> 8).max(first)
 }
 
-/// The last sample of the picture at or before a coordinate.
+/// The last sample at or before a coordinate, up to the window's last.
 #[inline(always)]
-fn last_sample<S: Simd>(subpixels: i32x16<S>, size: u32) -> i32x16<S> {
-    ((subpixels - SUBPIXELS / 2) >> 8).min(size as i32 - 1)
+fn last_sample<S: Simd>(subpixels: i32x16<S>, last: i32) -> i32x16<S> {
+    ((subpixels - SUBPIXELS / 2) >> 8).min(last)
 }
 
 /// An edge as [`pellucid_core::pixel_grid::Edge`] has it: change for one sample to the right and downwards, and value at a

@@ -160,28 +160,29 @@ impl SmallTriangles {
         let mut covered = [0; LANES];
         let mut primitives = [0; LANES];
         let mut place = fragments.count;
-        let mut turns = 0;
+        // A bit for each lane that has fragments left.
+        let mut active = 0u32;
         for lane in 0..triangle_count {
             next[lane] = place;
             covered[lane] = self.covered[lane];
             primitives[lane] = draw.first_primitive + self.triangles[lane];
-            let count = covered[lane].count_ones();
-            place += count as usize;
-            turns = turns.max(count);
+            place += covered[lane].count_ones() as usize;
+            active |= u32::from(covered[lane] != 0) << lane;
         }
         fragments.make_room(place);
         let left = i32x16::load_array(simd, self.left);
         let top = i32x16::load_array(simd, self.top);
-        let (columns, rows) = (TILE_PX - 1, TILE_PX - 1);
-        for _ in 0..turns {
+        let last = TILE_PX as i32 - 1;
+        while active != 0 {
             let mut bits = [0; LANES];
             for (bit, covered) in bits.iter_mut().zip(&covered) {
                 *bit = covered.trailing_zeros() as i32;
             }
             let bits = i32x16::load_array(simd, bits);
             let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
-            let tile = (y >> 5) * grid.columns as i32 + (x >> 5);
-            let places = (tile << SAMPLE_BITS) | ((y & rows as i32) << 5) | (x & columns as i32);
+            let (column, row) = (x - grid.window.left, y - grid.window.top);
+            let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
+            let places = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
             let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
             let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
             // Adding zero turns -0 into 0.
@@ -192,11 +193,13 @@ impl SmallTriangles {
             };
             let (places, depth, light): ([i32; LANES], [f32; LANES], [f32; LANES]) =
                 (places.into(), depth.into(), light.into());
-            for lane in 0..triangle_count {
-                if covered[lane] == 0 {
-                    continue;
-                }
+            // Without a branch that depends on when a lane is done, which would often be mispredicted.
+            let mut lanes = active;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LANES;
+                lanes &= lanes - 1;
                 covered[lane] &= covered[lane] - 1;
+                active &= !(u32::from(covered[lane] == 0) << lane);
                 let place = next[lane];
                 next[lane] += 1;
                 fragments.places[place] = places[lane] as u32;
@@ -372,8 +375,13 @@ impl SmallFragments {
     }
 
     /// Adds how many fragments each tile has.
-    pub(crate) fn add_counts(&self, counts: &mut [u32]) {
-        add_counts(&self.starts, counts);
+    pub(crate) fn add_counts(&self, counts: &mut [u64]) {
+        add_counts(&self.starts, 1, counts);
+    }
+
+    /// Adds how many bytes each tile needs.
+    pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
+        add_counts(&self.starts, size_of::<SmallFragment>() + 2, bytes);
     }
 
     /// Bytes held.
@@ -384,9 +392,9 @@ impl SmallFragments {
     }
 }
 
-/// Adds the lengths of the ranges between `starts`.
-pub(crate) fn add_counts(starts: &[u32], counts: &mut [u32]) {
+/// Adds the lengths of the ranges between `starts`, each place counting as so many.
+pub(crate) fn add_counts(starts: &[u32], weight: usize, counts: &mut [u64]) {
     for (count, range) in counts.iter_mut().zip(starts.windows(2)) {
-        *count += range[1] - range[0];
+        *count += u64::from(range[1] - range[0]) * weight as u64;
     }
 }

@@ -6,14 +6,15 @@ use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::pixel_grid::ScreenTriangle;
 use pellucid_core::primitive::{Draw, Fold};
-use pellucid_core::shading::{NormalPlane, lit};
+use pellucid_core::shading::{NormalPlane, Varying, lit};
 use pellucid_core::{Fragment, Layers};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
-use crate::fragments::Fragments;
+use crate::fragments::{COLOR, Fragments};
 use crate::order::Order;
 use crate::raster::{Coverage, Depths, FoldState, RowFragments, cover};
 use crate::setup::{Chunk, Record};
+use crate::shade::{VaryingSurface, shade};
 use crate::small::SmallFragment;
 use crate::surfaces::Surfaces;
 
@@ -23,8 +24,7 @@ pub(crate) const TILE_SAMPLES: usize = (TILE_PX * TILE_PX) as usize;
 /// Samples beyond a tile's last that vectors may touch.
 pub(crate) const TILE_SLACK: usize = 8;
 
-/// Where the colour of a fragment comes from: 0 for none, the number of a draw plus 1, in whose palette colour it is lit,
-/// or a place in [`Surfaces`] with this bit set.
+/// In the source of an opaque surface's colour: a place in [`Surfaces`]. Other sources are those of fragments.
 pub(crate) const SURFACE: u32 = 1 << 31;
 
 /// What is captured of a tile, and the memory for it: kept from tile to tile.
@@ -61,6 +61,27 @@ impl FragmentCounts {
     }
 }
 
+/// Samples of a tile that are captured in one go.
+#[derive(Debug, Clone, Copy)]
+struct Band {
+    first: u32,
+    count: u32,
+}
+
+impl Band {
+    /// A sample of the tile as one of the band.
+    #[inline(always)]
+    fn sample(self, sample: u16) -> Option<usize> {
+        let sample = u32::from(sample).wrapping_sub(self.first);
+        (sample < self.count).then_some(sample as usize)
+    }
+
+    #[inline(always)]
+    fn is_whole_tile(self) -> bool {
+        self.count == TILE_PX * TILE_PX
+    }
+}
+
 impl Default for TileCapture {
     fn default() -> Self {
         Self {
@@ -89,16 +110,70 @@ pub(crate) struct FrameParts<'a> {
     pub(crate) level: Level,
 }
 
+/// Fragments that a capture is meant to have at most: more leave the second-level cache.
+const MOST_FRAGMENTS: u64 = 1 << 16;
+
+/// Fewest rows of a band: what it takes to set up a triangle again in each is shared by few fragments then.
+const FEWEST_ROWS: u32 = 2;
+
+/// Records of which one is looked at to guess how many fragments there are.
+const RECORDS_FOR_A_GUESS: usize = 8;
+
+impl FrameParts<'_> {
+    /// Rows of the bands into which a tile of so many records and small fragments is cut, so that each has few enough
+    /// fragments. So a tile's memory does not grow with depth complexity either, up to thousands.
+    pub(crate) fn band_rows(&self, number: u32, records: u64, small: u64) -> u32 {
+        let mut fragments = small;
+        if small + records * TILE_SAMPLES as u64 > MOST_FRAGMENTS {
+            fragments += self.guess_fragments(number);
+        }
+        let mut rows = TILE_PX;
+        while fragments > MOST_FRAGMENTS && rows > FEWEST_ROWS {
+            (rows, fragments) = (rows / 2, fragments / 2);
+        }
+        rows
+    }
+
+    /// About how many fragments the records of a tile have.
+    fn guess_fragments(&self, number: u32) -> u64 {
+        let rect = self.grid.tile(number);
+        let mut fragments = 0;
+        for chunk in self.chunks {
+            for bins in [&chunk.opaque, &chunk.transparent] {
+                for &record in bins.records.tile(number).iter().step_by(RECORDS_FOR_A_GUESS) {
+                    if let Some(samples) = self.grid.samples_in_bounds(&chunk.record(record).vertices) {
+                        let columns = samples.right.min(rect.right) + 1 - samples.left.max(rect.left);
+                        let rows = samples.bottom.min(rect.bottom) + 1 - samples.top.max(rect.top);
+                        // A triangle fills half of its bounds.
+                        fragments += (columns * rows) as u64 * RECORDS_FOR_A_GUESS as u64 / 2;
+                    }
+                }
+            }
+        }
+        fragments
+    }
+}
+
 impl TileCapture {
-    /// Captures a tile and orders its fragments.
-    pub(crate) fn capture(&mut self, number: u32, frame: FrameParts<'_>) -> FragmentCounts {
-        dispatch!(frame.level, simd => self.capture_simd(simd, number, frame));
+    /// Captures a band of a tile: `rows` of its rows from row `first` on.
+    pub(crate) fn capture(&mut self, number: u32, [first, rows]: [u32; 2], frame: FrameParts<'_>) {
+        let tile = frame.grid.tile(number);
+        self.rect = PixelRect {
+            top: tile.top + first as i32,
+            bottom: tile.bottom.min(tile.top + (first + rows) as i32 - 1),
+            ..tile
+        };
+        let band = Band { first: first * TILE_PX, count: rows * TILE_PX };
+        dispatch!(frame.level, simd => self.capture_simd(simd, number, band, frame));
+    }
+
+    /// Orders the fragments captured.
+    pub(crate) fn sort(&mut self, frame: FrameParts<'_>) -> FragmentCounts {
         self.order.sort(frame.level, &self.fragments)
     }
 
     #[inline(always)]
-    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, frame: FrameParts<'_>) {
-        self.rect = frame.grid.tile(number);
+    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, band: Band, frame: FrameParts<'_>) {
         self.surfaces.clear();
         self.fragments.clear();
         self.fold.reset();
@@ -114,9 +189,10 @@ impl TileCapture {
             let records = chunk.opaque.records.tile(number);
             self.has_opaque |= !fragments.is_empty() || !records.is_empty();
             for (fragment, &sample) in fragments.iter().zip(samples) {
+                let Some(sample) = band.sample(sample) else { continue };
                 let key = order_key(fragment.depth, fragment.primitive);
-                if key >= self.opaque_keys[sample as usize] {
-                    self.put_opaque(sample as usize, key, fragment.light, fragment.draw + 1);
+                if key >= self.opaque_keys[sample] {
+                    self.put_opaque(sample, key, fragment.light, fragment.draw + 1);
                 }
             }
             for &record in records {
@@ -134,11 +210,11 @@ impl TileCapture {
                 let record = chunk.record(record);
                 let primitive = frame.draws[record.draw as usize].first_primitive + record.triangle;
                 let before = small.iter().take_while(|fragment| fragment.primitive < primitive).count();
-                self.add_small(&small[..before], &samples[..before]);
+                self.add_small(&small[..before], &samples[..before], band);
                 (small, samples) = (&small[before..], &samples[before..]);
                 self.add_transparent(simd, chunk, record, frame, &mut coverage);
             }
-            self.add_small(small, samples);
+            self.add_small(small, samples, band);
         }
     }
 
@@ -196,17 +272,18 @@ impl TileCapture {
         }
     }
 
-    /// Adds fragments of small triangles unless they lie behind an opaque surface.
+    /// Adds fragments of small triangles that lie in a band, unless they lie behind an opaque surface.
     #[inline(always)]
-    fn add_small(&mut self, small: &[SmallFragment], samples: &[u16]) {
-        if !self.has_opaque {
+    fn add_small(&mut self, small: &[SmallFragment], samples: &[u16], band: Band) {
+        if !self.has_opaque && band.is_whole_tile() {
             self.fragments.extend(small, samples);
             return;
         }
         for (fragment, &sample) in small.iter().zip(samples) {
-            if fragment.depth >= self.opaque_depths[sample as usize] {
+            let Some(sample) = band.sample(sample) else { continue };
+            if fragment.depth >= self.opaque_depths[sample] {
                 self.fragments.push(
-                    u32::from(sample),
+                    sample as u32,
                     fragment.depth,
                     fragment.light,
                     fragment.draw + 1,
@@ -237,39 +314,24 @@ impl TileCapture {
         }
         let weights = triangle.weight_planes();
         let depths = Depths::new(&triangle, weights, self.rect);
-        if !draw.varies() {
-            let normal = NormalPlane::new(&record.normals, weights);
-            let steady = !draw.lit || draw.mesh.normals().is_none();
-            let rows = RowFragments::new(simd, &depths, &normal, steady);
-            for y in coverage.top..=coverage.bottom {
-                let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
-                rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut self.fragments);
-            }
-            return;
-        }
-        let place = self.surfaces.add(chunk, record, &triangle, weights, draw);
+        let normal = NormalPlane::new(&record.normals, weights);
+        let steady = !draw.lit || draw.mesh.normals().is_none();
+        let rows = RowFragments::new(simd, &depths, &normal, steady);
+        let first = self.fragments.end();
         for y in coverage.top..=coverage.bottom {
-            let mut mask = coverage.rows[y];
-            let row = depths.row(y);
-            while mask != 0 {
-                let x = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                let sample = y * TILE_PX as usize + x;
-                let depth = depths.at(row, x);
-                // In front of the opaque surface, or level with it.
-                if depth < self.opaque_depths[sample] {
-                    continue;
-                }
-                let mut shaded = place;
-                if draw.cutoff.is_some() {
-                    let (x, y) = (self.rect.left + x as i32, self.rect.top + y as i32);
-                    match self.surfaces.add_shaded(place, x, y, frame.draws) {
-                        Some(fragment) => shaded = fragment,
-                        None => continue,
-                    }
-                }
-                self.fragments.push(sample as u32, depth, 0.0, shaded | SURFACE, primitive);
-            }
+            let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
+            rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut self.fragments);
+        }
+        if draw.varies() && self.fragments.end() > first {
+            let piece = chunk.piece(record, triangle);
+            let [anchor_x, anchor_y] = triangle.anchor_px();
+            let surface = VaryingSurface {
+                draw,
+                varying: Varying::new(draw, record.triangle as usize, &piece, weights),
+                left: self.rect.left - anchor_x,
+                top: self.rect.top - anchor_y,
+            };
+            shade(frame.level, &surface, first, &mut self.fragments);
         }
     }
 
@@ -278,6 +340,9 @@ impl TileCapture {
     pub(crate) fn color(&self, source: u32, light: f32, x: i32, y: i32, frame: FrameParts<'_>) -> Option<Vec4> {
         if source & SURFACE != 0 {
             return self.surfaces.color(source & !SURFACE, x, y, frame.draws);
+        }
+        if source & COLOR != 0 {
+            return self.fragments.colors().get((source & !COLOR) as usize).copied();
         }
         Some(lit(frame.palette[source as usize], light))
     }

@@ -55,13 +55,18 @@ impl Renderer {
     #[must_use]
     pub fn threads(mut self, threads: usize) -> Self {
         self.cpu = CpuRenderer::new(threads);
+        if let Some(budget_bytes) = self.budget_bytes {
+            self.cpu = self.cpu.budget_bytes(budget_bytes);
+        }
         self
     }
 
-    /// The same renderer with a budget: bytes that a capture on the GPU may hold. The picture is the same at any.
+    /// The same renderer with a budget: bytes that a capture may hold, on the GPU or before the tiles of the CPU. The
+    /// picture is the same at any.
     #[must_use]
     pub fn budget_bytes(mut self, budget_bytes: u64) -> Self {
         self.budget_bytes = Some(budget_bytes);
+        self.cpu = self.cpu.budget_bytes(budget_bytes);
         #[cfg(feature = "gpu")]
         {
             self.gpu = OnceLock::new();

@@ -181,10 +181,12 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 24] = [
+const STEP_ORDER: [&str; 26] = [
     "transform",
     "clip, setup and bin",
-    "raster, sort, shade and resolve",
+    "raster",
+    "order",
+    "shade and resolve",
     "geometry",
     "opaque",
     "set-up",
