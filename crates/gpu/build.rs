@@ -88,8 +88,14 @@ fn main() {
             }
         }
     }
-    for stem in ["setup", "bin", "scatter", "dispatch", "sort", "cover"] {
+    for stem in ["scatter", "dispatch", "sort", "cover"] {
         linked.insert(format!("LUCID_{}", stem.to_uppercase()), link("technique::lucid", stem));
+    }
+    for stem in ["setup", "bin"] {
+        for (suffix, subgroups) in [("", false), ("_SUBGROUPS", true)] {
+            let linked_text = compile(&path("technique::lucid", stem), None, &[("subgroups", subgroups)]);
+            linked.insert(format!("LUCID_{}{suffix}", stem.to_uppercase()), linked_text);
+        }
     }
     // Those that shade know all draws at once, and only read what was set up.
     for stem in ["raster", "hide"] {

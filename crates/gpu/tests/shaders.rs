@@ -14,7 +14,11 @@ fn module(name: &str, wgsl: &str) -> naga::Module {
 fn every_linked_shader_is_valid() {
     for (name, wgsl) in shaders::ALL {
         let module = module(name, wgsl);
-        Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32)
+        let has_subgroups = name.ends_with("_SUBGROUPS");
+        let capabilities = if has_subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+        Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32 | capabilities)
+            .subgroup_stages(naga::valid::ShaderStages::COMPUTE)
+            .subgroup_operations(naga::valid::SubgroupOperationSet::all())
             .validate(&module)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(wgsl)));
     }

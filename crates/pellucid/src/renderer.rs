@@ -68,8 +68,8 @@ impl Renderer {
         self.budget_bytes = Some(budget_bytes);
         self.cpu = self.cpu.budget_bytes(budget_bytes);
         #[cfg(feature = "gpu")]
-        {
-            self.gpu = OnceLock::new();
+        if let Some(gpu) = self.gpu.take() {
+            self.gpu = OnceLock::from(gpu.budget_bytes(budget_bytes));
         }
         self
     }
@@ -79,7 +79,9 @@ impl Renderer {
     #[must_use]
     pub fn storage(mut self, storage: Storage) -> Self {
         self.storage = storage;
-        self.gpu = OnceLock::new();
+        if let Some(gpu) = self.gpu.take() {
+            self.gpu = OnceLock::from(gpu.storage(storage));
+        }
         self
     }
 

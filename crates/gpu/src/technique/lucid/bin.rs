@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
+use wgpu::{BindGroupLayout, ComputePipeline, Features, ShaderModule};
 
 use super::work::{Dispatch, Shading, blocks};
 use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
@@ -38,7 +38,9 @@ impl Bin {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
         };
-        let bin = shader(gpu, "bins", shaders::LUCID_BIN);
+        let has_subgroups = gpu.has(Features::SUBGROUP);
+        let wgsl = if has_subgroups { shaders::LUCID_BIN_SUBGROUPS } else { shaders::LUCID_BIN };
+        let bin = shader(gpu, "bins", wgsl);
         let scatter = shader(gpu, "lists", shaders::LUCID_SCATTER);
         Self {
             find_bins: pipeline("bins", &bin, "find_bins", &buffers),

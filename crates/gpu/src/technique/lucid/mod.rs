@@ -24,7 +24,8 @@
 //! - Coverage is exact, and so is the order: pixels for which the filter was too small are found and mended, and equal depths
 //!   follow draw order. The depths that blocks are sorted by only decide how many have to be.
 //! - All buffers are as large as counters say; a window that overflows is repeated or split.
-//! - Subgroups are not used: no invocation waits for another but where set-up and bins allocate.
+//! - Subgroups of any size, where the device has them, take places in lists at once, in set-up and bins. Nowhere else does an
+//!   invocation wait for another.
 //!
 //! Where time goes on llvmpipe with 2 cores, in milliseconds, with the whole of `linear` in the same run beside; 1280 x 720, from
 //! the front, opacity 0.3:

@@ -3,7 +3,7 @@
 use pellucid_core::Mesh;
 use pellucid_core::pixel_grid::Viewport;
 use pellucid_core::primitive::draws;
-use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline};
+use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, Features};
 
 use super::record::Clipped;
 use super::work::{Counts, Header, RECORD_BYTES};
@@ -32,7 +32,9 @@ impl Setup {
     pub(super) fn new(gpu: &Context, surfaces: &SurfaceLayouts) -> Self {
         let (positions, quads) = (buffers_layout(gpu, &[(0, true)]), buffers_layout(gpu, &[(0, true)]));
         let buffers = buffers_layout(gpu, &[0, 1, 2, 3, 4].map(|binding| (binding, false)));
-        let module = shader(gpu, "set-up", shaders::LUCID_SETUP);
+        let has_subgroups = gpu.has(Features::SUBGROUP);
+        let wgsl = if has_subgroups { shaders::LUCID_SETUP_SUBGROUPS } else { shaders::LUCID_SETUP };
+        let module = shader(gpu, "set-up", wgsl);
         let layouts = [&surfaces.frame, &positions, &quads, &buffers].map(Some);
         let pipeline = compute_pipeline(gpu, "set-up", &module, "main", &layouts, &[]);
         Self { positions, quads, buffers, pipeline }
