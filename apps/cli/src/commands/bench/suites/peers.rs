@@ -16,7 +16,7 @@ pub(super) const SUITE: Suite = Suite {
 };
 
 fn scenes() -> Series {
-    use Technique::{ABuffer, Alpha, Cpu, Linear, List, Pages, Peel};
+    use Technique::{ABuffer, Alpha, Cpu, Linear, List, Lucid, Pages, Peel};
     let file = |path, stand_in| Source::File { path, stand_in };
     // Seen from two sides each.
     let around = |label: &str, source: Source, work: Work| {
@@ -49,7 +49,7 @@ fn scenes() -> Series {
         about: "Every material's alpha times 0.3 (Sponza: 0.5, the camera inside), 1280 x 720. How many times longer than the \
                 CPU renderer the others take: above 1 the CPU renderer is faster.",
         axis: None,
-        variants: [Cpu, Alpha, Linear, List, Pages, ABuffer, Peel].map(Variant::of).to_vec(),
+        variants: [Cpu, Alpha, Linear, List, Pages, Lucid, ABuffer, Peel].map(Variant::of).to_vec(),
         points,
         shows: &[Show::Peers, Show::Times],
         published: Some(Published {
