@@ -307,7 +307,7 @@ pub(crate) struct CaptureArgs {
     pub(crate) fbuffer: Option<String>,
 
     /// Fragments of a pixel that lucid lets wait for nearer ones, from 1 to 12: with more of them, fewer pixels have to be
-    /// rendered again. The picture is the same at any [default: 3]
+    /// sorted. The picture is the same at any [default: 3]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) filter_size: Option<String>,
 

@@ -47,7 +47,7 @@ pub struct Stats {
     pub cut_pixels: u64,
     /// Windows of slots that an F-Buffer slid over, in all parts of the screen; 0 for other techniques.
     pub slot_windows: u64,
-    /// Pixels that a depth filter left out of order, and that were rendered again; 0 for techniques without.
+    /// Pixels that a depth filter left out of order, and that were sorted after it; 0 for techniques without.
     pub repaired_pixels: u64,
     /// Parts of triangles in half-blocks of 8 x 4 pixels, which a rasterizer in compute sorts by depth; 0 for other techniques.
     pub half_block_parts: u64,

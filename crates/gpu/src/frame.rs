@@ -100,7 +100,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) slot_windows: u64,
     /// How the rasterizer in compute blends.
     pub(crate) depth_filter: DepthFilter,
-    /// Pixels that its depth filter left out of order, and that were rendered again.
+    /// Pixels that its depth filter left out of order, and that were sorted after it.
     pub(crate) repaired_pixels: u64,
     /// Parts of triangles in half-blocks.
     pub(crate) half_block_parts: u64,

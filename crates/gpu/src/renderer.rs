@@ -123,7 +123,7 @@ impl GpuRenderer {
     }
 
     /// The same renderer with another depth filter, through which the technique `lucid` blends. The picture is the same with
-    /// a filter of any size, as pixels that it leaves out of order are rendered again.
+    /// a filter of any size, as pixels that it leaves out of order are sorted.
     #[must_use]
     pub fn depth_filter(mut self, depth_filter: DepthFilter) -> Self {
         self.depth_filter = depth_filter;

@@ -143,21 +143,7 @@ fn upload_texture(gpu: &Context, texture: &Texture) -> Result<wgpu::Texture, Gpu
         view_formats: &[],
     })?;
     for (layer, levels) in (0..).zip([full_size, smaller]) {
-        let mut top = 0;
-        for level in levels {
-            gpu.queue.write_texture(
-                wgpu::TexelCopyTextureInfo {
-                    texture: &uploaded,
-                    mip_level: 0,
-                    origin: wgpu::Origin3d { x: 0, y: top, z: layer },
-                    aspect: wgpu::TextureAspect::All,
-                },
-                level.texels.as_flattened(),
-                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
-                wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
-            );
-            top += level.height;
-        }
+        atlas::write(gpu, &uploaded, 0, layer, levels);
     }
     Ok(uploaded)
 }

@@ -4,7 +4,7 @@
 //! where they are missing, built-in scenes of like size stand in. Prints the median and the spread of each scene's
 //! frames, in milliseconds.
 
-use std::path::{Path, PathBuf};
+mod common;
 
 use pellucid::core::view::direction;
 use pellucid::{Camera, Renderer, Resolve, View};
@@ -35,7 +35,7 @@ const CASES: [Case; 7] = [
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let scenes = scene_folder();
+    let scenes = common::scene_folder();
     println!(
         "{:<20} {:>10} {:>12} {:>5} {:>9} {:>9} {:>9} {:>8}  steps of the last frame",
         "scene", "triangles", "fragments", "depth", "median ms", "least", "greatest", "peak MiB"
@@ -85,19 +85,4 @@ fn measure(case: &Case, source: &str) {
         steps.join(", "),
         if source.starts_with('@') { format!("  ({source})") } else { String::new() }
     );
-}
-
-fn scene_folder() -> Option<PathBuf> {
-    if let Some(folder) = std::env::var_os("PELLUCID_SCENES") {
-        return Some(folder.into());
-    }
-    let mut folder = Some(Path::new(env!("CARGO_MANIFEST_DIR")));
-    while let Some(here) = folder {
-        let scenes = here.join("shared/scenes");
-        if scenes.is_dir() {
-            return Some(scenes);
-        }
-        folder = here.parent();
-    }
-    None
 }

@@ -4,8 +4,9 @@
 //! renderer can leave out, on data in the cache, without a decision. Then each step of whole frames stands beside its floor,
 //! and last come the SIMD levels, raster to resolve alone. Scenes are found as by `frames`.
 
+mod common;
+
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use fearless_simd::{Level, Simd, SimdBase, SimdNarrow, SimdSplit, dispatch, f32x8, f64x8, u32x8};
@@ -261,8 +262,9 @@ fn blend<S: Simd>(simd: S, room: &Room) -> f64 {
 
 impl Case {
     fn load(&self) -> (Scene, View) {
-        let file =
-            scene_folder().map(|folder| folder.join(self.file)).filter(|file| !self.file.is_empty() && file.exists());
+        let file = common::scene_folder()
+            .map(|folder| folder.join(self.file))
+            .filter(|file| !self.file.is_empty() && file.exists());
         let source = file.map_or(self.stand_in.to_owned(), |file| file.display().to_string());
         let scene = match pellucid::load(&source) {
             Ok(loaded) => loaded.scene,
@@ -288,19 +290,4 @@ fn median(renderer: &CpuRenderer, scene: &Scene, view: &View, frames: usize) -> 
         .collect();
     all.sort_by(|a, b| a.total_ms.total_cmp(&b.total_ms));
     all.swap_remove(frames / 2)
-}
-
-fn scene_folder() -> Option<PathBuf> {
-    if let Some(folder) = std::env::var_os("PELLUCID_SCENES") {
-        return Some(folder.into());
-    }
-    let mut folder = Some(Path::new(env!("CARGO_MANIFEST_DIR")));
-    while let Some(here) = folder {
-        let scenes = here.join("shared/scenes");
-        if scenes.is_dir() {
-            return Some(scenes);
-        }
-        folder = here.parent();
-    }
-    None
 }

@@ -1,8 +1,8 @@
 //! From a captured LFB to ordered fragments to the picture, the same for every technique that is an LFB. Twins:
 //! `shaders/pass/{classify,sort,resolve}.wesl`, linked with the technique's own module.
 //!
-//! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step "classify" lists runs of 64 pixels
-//! by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
+//! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step
+//! "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
 //! the way to the resolve, in "read and blend", up to 8, 16 or 32 fragments are sorted in registers by networks
 //! (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
 //! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n) and no memory but

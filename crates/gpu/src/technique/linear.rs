@@ -17,7 +17,7 @@
 //! | read and blend |  5 |  2 |  8 |  6 |
 //!
 //! Meshes of small triangles are transformed and set up twice, which costs more than their fragments; where textures are
-//! read (Sponza), the second pass does nearly all, and this technique is the fastest of all that are exact.
+//! read (Sponza), the second pass does nearly all, and this technique is the fastest exact one where no window is cut.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};

@@ -18,8 +18,9 @@
 //! | read and blend |  8 |  4 | 22 | 16 |
 //! | empty pixels   |  6 |  2 |  1 |  1 |
 //!
-//! One pass over the geometry makes it the fastest exact technique on bunny, dragon and hair, by 1.2 to 1.7 over `linear`; its links
-//! make reading two to three times as long. On the bunny a tenth of the frame is two threads taking turns at the counter.
+//! One pass over the geometry makes it 1.2 to 1.7 times as fast as `linear` on bunny, dragon and hair, where only `lucid` is
+//! faster; its links make reading two to three times as long. On the bunny a tenth of the frame is two threads taking turns
+//! at the counter.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ShaderStages};

@@ -97,12 +97,13 @@ fn size_of(levels: &[MipLevel]) -> [u32; 2] {
     [width, levels.iter().map(|level| level.height).sum::<u32>().max(1)]
 }
 
-fn write(gpu: &Context, atlas: &wgpu::Texture, place: u32, page: u32, levels: &[MipLevel]) {
+/// Writes levels one under the other from a place on, with x in the lower half of it and y in the upper.
+pub(super) fn write(gpu: &Context, array: &wgpu::Texture, place: u32, page: u32, levels: &[MipLevel]) {
     let mut y = place >> 16;
     for level in levels {
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
-                texture: atlas,
+                texture: array,
                 mip_level: 0,
                 origin: wgpu::Origin3d { x: place & 0xffff, y, z: page },
                 aspect: wgpu::TextureAspect::All,
