@@ -336,6 +336,7 @@ impl Lucid {
             self.blend.record(frame, window, &listed, &lfb, [&buffers.wrong, &buffers.dispatches])?;
         }
         frame.half_block_parts += u64::from(counts.half_blocks);
+        if std::env::var("LUCIDDBG").is_ok() { eprintln!("{counts:?} {fragment_count}"); }
         Ok(Attempt::Done(counts, fragment_count))
     }
 
