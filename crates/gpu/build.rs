@@ -93,13 +93,17 @@ fn main() {
     }
     for stem in ["setup", "bin"] {
         for (suffix, subgroups) in [("", false), ("_SUBGROUPS", true)] {
-            let linked_text = compile(&path("technique::lucid", stem), None, &[("subgroups", subgroups)]);
+            let linked_text = compile(&path("technique::lucid", stem), None, &[
+                ("subgroups", subgroups),
+                ("sets_up", stem == "setup"),
+                ("tables", true),
+            ]);
             linked.insert(format!("LUCID_{}{suffix}", stem.to_uppercase()), linked_text);
         }
     }
-    // Those that shade know all draws at once, and only read what was set up.
+    // Those that shade know all draws at once.
     for stem in ["raster", "hide"] {
-        let features = [("all_draws", true), ("read_only", true)];
+        let features = [("all_draws", true), ("tables", true)];
         let linked_text = compile(&path("technique::lucid", stem), None, &features);
         linked.insert(format!("LUCID_{}", stem.to_uppercase()), linked_text);
     }

@@ -25,6 +25,7 @@ mod renderer;
 pub mod shaders;
 mod steps;
 mod surface;
+mod table;
 mod technique;
 mod upload;
 

@@ -7,7 +7,7 @@ use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ComputePipeline, Features, ShaderModule};
 
 use super::work::{Dispatch, Shading, blocks};
-use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
+use super::{OwnLayouts, Stage, stage_group, stage_layout};
 use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
@@ -32,8 +32,8 @@ pub(super) struct Bin {
 
 impl Bin {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
-        let buffers = buffers_layout(gpu, &[0, 1, 2, 3, 4].map(|binding| (binding, false)));
-        let list_buffers = buffers_layout(gpu, &[0, 2, 3, 4, 5, 6, 9].map(|binding| (binding, false)));
+        let buffers = stage_layout(gpu, &[1], &[0, 2, 3, 4].map(|binding| (binding, false)));
+        let list_buffers = stage_layout(gpu, &[], &[0, 2, 3, 4, 5, 6, 9].map(|binding| (binding, false)));
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -52,7 +52,7 @@ impl Bin {
             list_parts: pipeline("lists", &scatter, "main", &list_buffers),
             buffers,
             list_buffers,
-            hide_buffers: buffers_layout(gpu, &[(0, false), (1, true), (2, false), (3, false)]),
+            hide_buffers: stage_layout(gpu, &[1], &[(0, false), (2, false), (3, false)]),
             hide_module: shader(gpu, "hide", shaders::LUCID_HIDE),
             hide: HashMap::new(),
         }
@@ -81,9 +81,8 @@ impl Bin {
         dispatch: Dispatch,
     ) -> Result<(), GpuError> {
         let buffers = stage.buffers;
-        let all = [&buffers.work, &buffers.records, &buffers.parts, &buffers.places, &buffers.block_parts];
-        let bindings: Vec<_> = (0..).zip(all).collect();
-        let group = buffer_group(frame.gpu, &self.buffers, &bindings);
+        let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (4, &buffers.block_parts)];
+        let group = stage_group(frame.gpu, &self.buffers, &[(1, &buffers.record_view)], &bindings);
         let mut pass = frame.compute_pass("bins")?;
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &stage.picture, &[]);
@@ -119,7 +118,7 @@ impl Bin {
             (6, &buffers.chunks),
             (9, &buffers.chunk_sums),
         ];
-        let group = buffer_group(frame.gpu, &self.list_buffers, &bindings);
+        let group = stage_group(frame.gpu, &self.list_buffers, &[], &bindings);
         let mut pass = frame.compute_pass("lists")?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
@@ -139,8 +138,8 @@ impl Bin {
             return Ok(());
         }
         let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let bindings = [(0, &buffers.work), (1, &buffers.records), (2, &buffers.parts), (3, &buffers.places)];
-        let group = buffer_group(gpu, &self.hide_buffers, &bindings);
+        let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places)];
+        let group = stage_group(gpu, &self.hide_buffers, &[(1, &buffers.record_view)], &bindings);
         let pipeline = self.hide.entry((stage.shading, tests_depth, tests_alpha)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.hide_buffers)];
             let [varies, smooth, flat] = stage.shading.constants();

@@ -7,7 +7,7 @@ use pellucid_core::Resolve;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
 
 use super::work::FILTER_SIZE;
-use super::{DepthFilter, buffer_group, buffers_layout};
+use super::{DepthFilter, stage_group, stage_layout};
 use crate::frame::Frame;
 use crate::memory::Window;
 use crate::pass::ordered::{Listed, OrderedPasses, compute_pipeline, resolve_code};
@@ -37,7 +37,7 @@ pub(super) struct Blend {
 
 impl Blend {
     pub(super) fn new(gpu: &Context, layouts: Layouts<'_>, ordered: &OrderedPasses, lfb: &BindGroupLayout) -> Self {
-        let wrong = buffers_layout(gpu, &[(0, false), (1, false)]);
+        let wrong = stage_layout(gpu, &[], &[(0, false), (1, false)]);
         let module = shader(gpu, "blend", shaders::LUCID_BLEND);
         let (picture, classes) = (layouts.picture, ordered.classes_layout());
         let own = [Some(picture), Some(classes), Some(&wrong), Some(lfb)];
@@ -82,7 +82,7 @@ impl Blend {
             compute_pipeline(gpu, "blend", &self.module, "main", &layouts, &constants)
         });
         let picture = frame.picture.bind_group.clone();
-        let group = buffer_group(gpu, &self.wrong, &[(0, wrong), (1, dispatches)]);
+        let group = stage_group(gpu, &self.wrong, &[], &[(0, wrong), (1, dispatches)]);
         frame.encoder().clear_buffer(wrong, 0, Some(8));
         let mut pass = frame.compute_pass("blend")?;
         pass.set_bind_group(0, &picture, &[]);
@@ -114,7 +114,7 @@ impl Blend {
         let gpu = frame.gpu;
         let picture = frame.picture.bind_group.clone();
         let code = resolve_code(frame.resolve);
-        let group = buffer_group(gpu, &self.classes, &[(0, wrong)]);
+        let group = stage_group(gpu, &self.classes, &[], &[(0, wrong)]);
         let mut pass = frame.compute_pass("repair")?;
         pass.set_bind_group(0, &picture, &[]);
         pass.set_bind_group(1, &group, &[]);

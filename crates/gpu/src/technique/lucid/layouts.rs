@@ -1,7 +1,8 @@
 //! What the stages have in common: layouts of bind groups, and the groups of a frame.
 
-use wgpu::{BindGroup, BindGroupLayout, BindingType, ShaderStages};
+use wgpu::{BindGroup, BindGroupLayout, BindingType, ShaderStages, TextureView};
 
+use super::LoadedScene;
 use crate::Context;
 use crate::frame::Frame;
 use crate::surface::storage_entry;
@@ -51,15 +52,15 @@ impl OwnLayouts {
             scene: layout(
                 "scene and draws",
                 &[
-                    storage_entry(0, compute, true),
-                    storage_entry(1, compute, true),
-                    storage_entry(2, compute, true),
-                    storage_entry(3, compute, true),
+                    table_entry(0),
+                    table_entry(1),
+                    table_entry(2),
+                    table_entry(3),
                     entry(4, texture(texels, pages)),
                 ],
             ),
             dispatches: layout("dispatches", &[storage_entry(0, compute, false)]),
-            work: buffers_layout(gpu, &[(0, false)]),
+            work: stage_layout(gpu, &[], &[(0, false)]),
         }
     }
 
@@ -71,43 +72,68 @@ impl OwnLayouts {
             view(&targets.opaque_depth_view),
             view(&targets.picture_view),
         ];
-        group(frame.gpu, &self.picture, resources)
+        group(frame.gpu, &self.picture, (0..).zip(resources))
     }
 
-    pub(super) fn scene_group(&self, frame: &Frame<'_>, draws: &wgpu::Buffer, atlas: &wgpu::TextureView) -> BindGroup {
-        let [positions, attributes, indices] = &frame.surfaces.scene().buffers;
-        let resources = [
-            positions.as_entire_binding(),
-            attributes.as_entire_binding(),
-            indices.as_entire_binding(),
-            draws.as_entire_binding(),
-            wgpu::BindingResource::TextureView(atlas),
-        ];
-        group(frame.gpu, &self.scene, resources)
+    pub(super) fn scene_group(&self, gpu: &Context, scene: &LoadedScene, draws: &TextureView) -> BindGroup {
+        let [positions, normals, colors] = &scene.vertices;
+        let textures = [positions, normals, colors, draws, &scene.atlas];
+        stage_group(gpu, &self.scene, &std::array::from_fn::<_, 5, _>(|i| (i as u32, textures[i])), &[])
     }
 }
 
-/// A layout of buffers by their bindings, each read only or not.
-pub(super) fn buffers_layout(gpu: &Context, bindings: &[(u32, bool)]) -> BindGroupLayout {
-    let entries: Vec<_> =
-        bindings.iter().map(|&(binding, read_only)| storage_entry(binding, ShaderStages::COMPUTE, read_only)).collect();
+/// A layout of tables and buffers by their bindings; buffers are read only or not.
+pub(super) fn stage_layout(gpu: &Context, tables: &[u32], buffers: &[(u32, bool)]) -> BindGroupLayout {
+    let mut entries: Vec<_> = tables.iter().map(|&binding| table_entry(binding)).collect();
+    let buffer = |&(binding, read_only): &(u32, bool)| storage_entry(binding, ShaderStages::COMPUTE, read_only);
+    entries.extend(buffers.iter().map(buffer));
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
 }
 
-pub(super) fn buffer_group(gpu: &Context, layout: &BindGroupLayout, buffers: &[(u32, &wgpu::Buffer)]) -> BindGroup {
-    let entries: Vec<_> = buffers
-        .iter()
-        .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
+/// The same with a table that is stored into, as far as such an access is allowed: without reading it.
+pub(super) fn stored_table_layout(gpu: &Context, table: u32, buffers: &[(u32, bool)]) -> BindGroupLayout {
+    let mut entries = vec![wgpu::BindGroupLayoutEntry {
+        ty: BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::WriteOnly,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            view_dimension: wgpu::TextureViewDimension::D2Array,
+        },
+        ..table_entry(table)
+    }];
+    entries.extend(buffers.iter().map(|&(binding, only)| storage_entry(binding, ShaderStages::COMPUTE, only)));
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
 }
 
-fn group<const N: usize>(
+fn table_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: ShaderStages::COMPUTE,
+        ty: BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2Array,
+            multisampled: false,
+        },
+        count: None,
+    }
+}
+
+pub(super) fn stage_group(
     gpu: &Context,
     layout: &BindGroupLayout,
-    resources: [wgpu::BindingResource<'_>; N],
+    tables: &[(u32, &TextureView)],
+    buffers: &[(u32, &wgpu::Buffer)],
+) -> BindGroup {
+    let tables = tables.iter().map(|&(binding, table)| (binding, wgpu::BindingResource::TextureView(table)));
+    let buffers = buffers.iter().map(|&(binding, buffer)| (binding, buffer.as_entire_binding()));
+    group(gpu, layout, tables.chain(buffers))
+}
+
+fn group<'a>(
+    gpu: &Context,
+    layout: &BindGroupLayout,
+    resources: impl Iterator<Item = (u32, wgpu::BindingResource<'a>)>,
 ) -> BindGroup {
     let entries: Vec<_> =
-        (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        resources.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
 }

@@ -61,11 +61,11 @@ mod work;
 use std::collections::HashMap;
 
 use pellucid_core::{Resolve, Scene};
-use wgpu::{BindGroup, BindGroupLayout, ComputePipeline};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, TextureView};
 
-use self::layouts::{OwnLayouts, buffer_group, buffers_layout};
+use self::layouts::{OwnLayouts, stage_group, stage_layout};
 use self::work::{
-    BLOCK_PARTS, CHUNK_SUMS, CHUNKS, Counts, DISPATCHES, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS,
+    BLOCK_PARTS, CHUNK_SUMS, CHUNKS, Counts, DISPATCHES, DRAW_GROUPS, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS,
     ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
 };
 use super::growth::most_that_fits;
@@ -77,7 +77,7 @@ use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
 use crate::surface::shader;
 use crate::upload::SceneUpload;
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// How the rasterizer in compute blends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,7 +134,9 @@ struct LoadedScene {
     revision: u64,
     /// Of each mesh.
     quads: Vec<setup::MeshQuads>,
-    atlas: wgpu::TextureView,
+    /// Tables of all.
+    vertices: [TextureView; 3],
+    atlas: TextureView,
 }
 
 impl LoadedScene {
@@ -147,7 +149,9 @@ impl LoadedScene {
 /// Buffers of a window.
 struct Buffers {
     work: wgpu::Buffer,
-    records: wgpu::Buffer,
+    /// A table.
+    records: wgpu::Texture,
+    record_view: TextureView,
     parts: wgpu::Buffer,
     places: wgpu::Buffer,
     block_parts: wgpu::Buffer,
@@ -248,13 +252,17 @@ impl Lucid {
         let needs = work::needs(room, 0, window, draws);
         // Fragments of the frame before stay where they are, unless they are in the way.
         frame.memory.make_room(&needs);
+        let records = work::record_groups(room);
+        let records = frame.memory.texture(gpu, RECORDS, &table::descriptor(RECORDS, records))?;
+        let all_draws = frame.memory.texture(gpu, DRAWS, &table::descriptor(DRAWS, draws * DRAW_GROUPS))?;
         let mut buffer = |name| {
             let bytes = needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
             frame.memory.buffer(gpu, name, bytes)
         };
         let buffers = Buffers {
             work: buffer(WORK)?,
-            records: buffer(RECORDS)?,
+            record_view: table::view(&records),
+            records,
             parts: buffer(PARTS)?,
             places: buffer(PLACES)?,
             block_parts: buffer(BLOCK_PARTS)?,
@@ -266,22 +274,21 @@ impl Lucid {
             wrong: buffer(WRONG)?,
             dispatches: buffer(DISPATCHES)?,
         };
-        let all_draws = buffer(DRAWS)?;
         frame.submit()?;
         gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room)));
-        gpu.queue.write_buffer(&all_draws, 0, bytemuck::cast_slice(&frame.surfaces.data));
+        table::write(gpu, &all_draws, bytemuck::cast_slice(&frame.surfaces.data).iter().copied());
         let Some(scene) = &self.scene else { unreachable!("it was loaded") };
         let stage = Stage {
             window,
             picture: self.layouts.picture_group(frame),
-            scene: self.layouts.scene_group(frame, &all_draws, &scene.atlas),
+            scene: self.layouts.scene_group(gpu, scene, &table::view(&all_draws)),
             shading: Shading::of(&frame.surfaces),
             buffers: &buffers,
         };
 
         frame.zero("zero", &buffers.block_parts, buffers.block_parts.size())?;
         frame.zero("zero", &buffers.chunks, buffers.chunks.size())?;
-        self.setup.record(frame, &stage, &scene.quads)?;
+        self.setup.record(frame, &stage, scene)?;
         if room.clipped > 0 {
             let header: Header = read_buffer(frame, &buffers.work, 0, 1)?[0];
             if !header.counts.fits(room) || !setup::clip(frame, &stage, &header)? {
@@ -327,7 +334,7 @@ impl Lucid {
         }
         let fragments = frame.memory.buffer(gpu, FRAGMENTS, fragment_count * FRAGMENT_BYTES)?;
         self.raster.shade(frame, &stage, &self.layouts, (&counts, &fragments))?;
-        let lfb = buffer_group(gpu, &self.lfb, &[(0, &buffers.offsets), (1, &fragments)]);
+        let lfb = stage_group(gpu, &self.lfb, &[], &[(0, &buffers.offsets), (1, &fragments)]);
         let needs_no_order = matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
         if matches!(frame.goal, Goal::Layers(_)) || needs_no_order || frame.presort {
             self.ordered.record(frame, window, &lfb)?;
@@ -336,7 +343,6 @@ impl Lucid {
             self.blend.record(frame, window, &listed, &lfb, [&buffers.wrong, &buffers.dispatches])?;
         }
         frame.half_block_parts += u64::from(counts.half_blocks);
-        if std::env::var("LUCIDDBG").is_ok() { eprintln!("{counts:?} {fragment_count}"); }
         Ok(Attempt::Done(counts, fragment_count))
     }
 
@@ -363,8 +369,8 @@ impl Lucid {
 
     fn set_dispatch_groups(&self, pass: &mut wgpu::ComputePass<'_>, frame: &Frame<'_>, stage: &Stage<'_>) {
         let gpu = frame.gpu;
-        pass.set_bind_group(2, &buffer_group(gpu, &self.layouts.dispatches, &[(0, &stage.buffers.dispatches)]), &[]);
-        pass.set_bind_group(3, &buffer_group(gpu, &self.layouts.work, &[(0, &stage.buffers.work)]), &[]);
+        pass.set_bind_group(2, &stage_group(gpu, &self.layouts.dispatches, &[], &[(0, &stage.buffers.dispatches)]), &[]);
+        pass.set_bind_group(3, &stage_group(gpu, &self.layouts.work, &[], &[(0, &stage.buffers.work)]), &[]);
     }
 }
 
@@ -383,7 +389,9 @@ impl Capture for Lucid {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..wgpu::TextureViewDescriptor::default()
         };
-        self.scene = Some(LoadedScene { revision: scene.revision(), quads, atlas: atlas.create_view(&pages) });
+        let vertices = setup::upload_vertices(gpu, scene)?;
+        let atlas = atlas.create_view(&pages);
+        self.scene = Some(LoadedScene { revision: scene.revision(), quads, vertices, atlas });
         Ok(())
     }
 

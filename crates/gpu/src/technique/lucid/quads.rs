@@ -8,16 +8,15 @@
 use glam::Vec3;
 use pellucid_core::Mesh;
 
-/// Words of a quad: four vertices, then two triangles with the number of the first of their corners from bit 30 on. The
-/// first triangle has vertices 0, 1 and 2, the second, if there is one, 0, 2 and 3. Twin: `quads` in
-/// `shaders/technique/lucid/setup.wesl`.
-pub(super) type Quad = [u32; 6];
+/// Four vertices and two triangles. The first triangle has vertices 0, 1 and 2, the second, if there is one, 0, 2 and 3.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quad {
+    pub(super) vertices: [u32; 4],
+    pub(super) triangles: [u32; 2],
+}
 
 /// In place of a second triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
-
-/// Triangles of a mesh that can be told from corners.
-pub(super) const MOST_TRIANGLES: usize = 1 << 30;
 
 /// Least area of a quad over the square of its longest side or diagonal, which is 1/2 for a square.
 const SQUARENESS: f32 = 1.0 / 32.0;
@@ -46,13 +45,13 @@ pub(super) fn quads(mesh: &Mesh, first_vertex: u32) -> Vec<Quad> {
             Some((other, _)) if other < triangle => continue,
             None => {
                 let [a, b, c] = [0, 1, 2].map(|corner| vertex(triangle, corner));
-                [a, b, c, c, triangle, NO_TRIANGLE]
+                Quad { vertices: [a, b, c, c], triangles: [triangle, NO_TRIANGLE] }
             }
             Some((other, starts)) => {
                 // The edge runs from vertex 2 to vertex 0 in the first, and back in the second.
                 let [first, second] = [(u32::from(starts[0]) + 1) % 3, u32::from(starts[1])];
                 let [a, b, c] = [0, 1, 2].map(|corner| vertex(triangle, first + corner));
-                [a, b, c, vertex(other, second + 2), triangle | first << 30, other | second << 30]
+                Quad { vertices: [a, b, c, vertex(other, second + 2)], triangles: [triangle, other] }
             }
         });
     }
@@ -61,7 +60,7 @@ pub(super) fn quads(mesh: &Mesh, first_vertex: u32) -> Vec<Quad> {
 
 /// How many quads have one triangle only.
 pub(super) fn lone(quads: &[Quad]) -> usize {
-    quads.iter().filter(|quad| quad[5] == NO_TRIANGLE).count()
+    quads.iter().filter(|quad| quad.triangles[1] == NO_TRIANGLE).count()
 }
 
 fn candidates(mesh: &Mesh) -> Vec<Candidate> {
@@ -159,14 +158,16 @@ mod tests {
     fn check(mesh: &Mesh, quads: &[Quad], first_vertex: u32) {
         let mut seen = vec![0; mesh.triangles().len()];
         for quad in quads {
-            for (packed, corners) in [(quad[4], [0, 1, 2]), (quad[5], [0, 2, 3])] {
-                if packed != NO_TRIANGLE {
-                    let (triangle, first) = ((packed & 0x3fff_ffff) as usize, packed >> 30);
-                    seen[triangle] += 1;
-                    for (corner, place) in (0..).zip(corners) {
-                        let vertex = mesh.triangles()[triangle][(first + corner) as usize % 3];
-                        assert_eq!(quad[place], first_vertex + vertex);
-                    }
+            for (triangle, places) in quad.triangles.into_iter().zip([[0, 1, 2], [0, 2, 3]]) {
+                if triangle != NO_TRIANGLE {
+                    seen[triangle as usize] += 1;
+                    let mut vertices = places.map(|place: usize| quad.vertices[place] - first_vertex);
+                    let expected = mesh.triangles()[triangle as usize];
+                    let is_turned = (0..3).any(|_| {
+                        vertices.rotate_left(1);
+                        vertices == expected
+                    });
+                    assert!(is_turned, "{vertices:?} instead of {expected:?}");
                 }
             }
         }
@@ -203,7 +204,7 @@ mod tests {
             assert_eq!(2 * quads.len() - lone(&quads), count);
             paired += quads.len() - lone(&quads);
             // No two that are alone could be one.
-            let alone: Vec<u32> = quads.iter().filter(|quad| quad[5] == NO_TRIANGLE).map(|quad| quad[4]).collect();
+            let alone: Vec<u32> = quads.iter().filter(|quad| quad.triangles[1] == NO_TRIANGLE).map(|quad| quad.triangles[0]).collect();
             let is_left = |candidate: &Candidate| candidate.triangles.iter().all(|triangle| alone.contains(triangle));
             assert!(!candidates(&mesh).iter().any(is_left), "not maximal");
         }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
 use super::work::{Counts, Dispatch, Header, Shading};
-use super::{OwnLayouts, Stage, buffer_group, buffers_layout};
+use super::{OwnLayouts, Stage, stage_group, stage_layout};
 use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
@@ -35,8 +35,8 @@ pub(super) struct Raster {
 
 impl Raster {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
-        let sort_buffers = buffers_layout(gpu, &[0, 2, 3, 5, 6, 7].map(|binding| (binding, false)));
-        let cover_buffers = buffers_layout(gpu, &[(6, false), (7, true), (8, false), (9, true)]);
+        let sort_buffers = stage_layout(gpu, &[], &[0, 2, 3, 5, 6, 7].map(|binding| (binding, false)));
+        let cover_buffers = stage_layout(gpu, &[], &[(6, false), (7, true), (8, false), (9, true)]);
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -55,7 +55,7 @@ impl Raster {
             count_fragments: pipeline("cover", &cover, "count_fragments", &cover_buffers),
             place_fragments: pipeline("places", &cover, "place_fragments", &cover_buffers),
             cover_buffers,
-            shade_buffers: buffers_layout(gpu, &[(1, true), (6, true), (7, true), (9, false)]),
+            shade_buffers: stage_layout(gpu, &[1], &[(6, true), (7, true), (9, false)]),
             shade_module: shader(gpu, "shade", shaders::LUCID_RASTER),
             shade: HashMap::new(),
         }
@@ -92,7 +92,7 @@ impl Raster {
             (6, &buffers.chunks),
             (7, &buffers.ordered),
         ];
-        let group = buffer_group(frame.gpu, &self.sort_buffers, &bindings);
+        let group = stage_group(frame.gpu, &self.sort_buffers, &[], &bindings);
         let mut pass = frame.compute_pass("sort")?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
@@ -103,7 +103,7 @@ impl Raster {
     pub(super) fn count(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, counts: &Counts) -> Result<(), GpuError> {
         let mut pass = self.cover_pass(frame, stage, "cover")?;
         pass.set_pipeline(&self.mark);
-        dispatch(&mut pass, u64::from(counts.chunks).div_ceil(CHUNKS_A_GROUP));
+        dispatch(&mut pass, u64::from(counts.chunks).div_ceil(LANES));
         pass.set_pipeline(&self.count_fragments);
         pass.dispatch_workgroups(stage.window.width.div_ceil(GROUP_PX), stage.window.height.div_ceil(GROUP_PX), 1);
         Ok(())
@@ -123,8 +123,8 @@ impl Raster {
         drop(pass);
 
         let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let bindings = [(1, &buffers.records), (6, &buffers.chunks), (7, &buffers.ordered), (9, fragments)];
-        let group = buffer_group(gpu, &self.shade_buffers, &bindings);
+        let bindings = [(6, &buffers.chunks), (7, &buffers.ordered), (9, fragments)];
+        let group = stage_group(gpu, &self.shade_buffers, &[(1, &buffers.record_view)], &bindings);
         let pipeline = self.shade.entry(stage.shading).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.shade_buffers)];
             compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &stage.shading.constants())
@@ -146,7 +146,7 @@ impl Raster {
     ) -> Result<wgpu::ComputePass<'static>, GpuError> {
         let buffers = stage.buffers;
         let bindings = [(6, &buffers.chunks), (7, &buffers.ordered), (8, &buffers.offsets), (9, &buffers.chunk_sums)];
-        let group = buffer_group(frame.gpu, &self.cover_buffers, &bindings);
+        let group = stage_group(frame.gpu, &self.cover_buffers, &[], &bindings);
         let mut pass = frame.compute_pass(step)?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);

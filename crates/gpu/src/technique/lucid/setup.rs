@@ -1,20 +1,22 @@
 //! Set-up of quads, and clipping of those triangles that need it. Twin: `shaders/technique/lucid/setup.wesl`.
 
-use pellucid_core::Mesh;
+use glam::{Vec3, Vec4};
 use pellucid_core::pixel_grid::Viewport;
 use pellucid_core::primitive::draws;
-use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, Features};
+use pellucid_core::{Mesh, Scene};
+use wgpu::{BindGroupLayout, ComputePipeline, Features};
 
 use super::record::Clipped;
-use super::work::{Counts, Header, RECORD_BYTES};
-use super::{Stage, buffer_group, buffers_layout, quads};
+use super::layouts::stored_table_layout;
+use super::work::{self, Counts, Header};
+use super::{LoadedScene, Stage, quads, stage_group, stage_layout};
 use crate::fbuffer::dispatch;
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
 use crate::readback::read_buffer;
 use crate::surface::{SurfaceLayouts, shader};
 use crate::upload::MeshUpload;
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// Invocations of a workgroup.
 const LANES: u64 = 64;
@@ -22,7 +24,7 @@ const LANES: u64 = 64;
 /// Long-lived half.
 #[derive(Debug)]
 pub(super) struct Setup {
-    positions: BindGroupLayout,
+    vertices: BindGroupLayout,
     quads: BindGroupLayout,
     buffers: BindGroupLayout,
     pipeline: ComputePipeline,
@@ -30,33 +32,31 @@ pub(super) struct Setup {
 
 impl Setup {
     pub(super) fn new(gpu: &Context, surfaces: &SurfaceLayouts) -> Self {
-        let (positions, quads) = (buffers_layout(gpu, &[(0, true)]), buffers_layout(gpu, &[(0, true)]));
-        let buffers = buffers_layout(gpu, &[0, 1, 2, 3, 4].map(|binding| (binding, false)));
+        let (vertices, quads) = (stage_layout(gpu, &[0], &[]), stage_layout(gpu, &[0], &[]));
+        let buffers = stored_table_layout(gpu, 1, &[0, 2, 3, 4].map(|binding| (binding, false)));
         let has_subgroups = gpu.has(Features::SUBGROUP);
         let wgsl = if has_subgroups { shaders::LUCID_SETUP_SUBGROUPS } else { shaders::LUCID_SETUP };
         let module = shader(gpu, "set-up", wgsl);
-        let layouts = [&surfaces.frame, &positions, &quads, &buffers].map(Some);
+        let layouts = [&surfaces.frame, &vertices, &quads, &buffers].map(Some);
         let pipeline = compute_pipeline(gpu, "set-up", &module, "main", &layouts, &[]);
-        Self { positions, quads, buffers, pipeline }
+        Self { vertices, quads, buffers, pipeline }
     }
 
     /// Sets up all transparent surfaces, draw by draw.
-    pub(super) fn record(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, quads: &[MeshQuads]) -> Result<(), GpuError> {
+    pub(super) fn record(&self, frame: &mut Frame<'_>, stage: &Stage<'_>, scene: &LoadedScene) -> Result<(), GpuError> {
         let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let [positions, ..] = &frame.surfaces.scene().buffers;
-        let positions = buffer_group(gpu, &self.positions, &[(0, positions)]);
-        let all = [&buffers.work, &buffers.records, &buffers.parts, &buffers.places, &buffers.block_parts];
-        let bindings: Vec<_> = (0..).zip(all).collect();
-        let group = buffer_group(gpu, &self.buffers, &bindings);
+        let vertices = stage_group(gpu, &self.vertices, &[(0, &scene.vertices[0])], &[]);
+        let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (4, &buffers.block_parts)];
+        let group = stage_group(gpu, &self.buffers, &[(1, &buffers.record_view)], &bindings);
         let mut pass = frame.compute_pass("set-up")?;
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(1, &positions, &[]);
+        pass.set_bind_group(1, &vertices, &[]);
         pass.set_bind_group(3, &group, &[]);
         for draw in frame.surfaces.compute_draws() {
-            let Some(quads) = &quads[draw.mesh].buffer else { continue };
+            let MeshQuads { table: Some(quads), count, .. } = &scene.quads[draw.mesh] else { continue };
             pass.set_bind_group(0, draw.frame_group, &[]);
-            pass.set_bind_group(2, &buffer_group(gpu, &self.quads, &[(0, quads)]), &[]);
-            dispatch(&mut pass, (quads.size() / size_of::<quads::Quad>() as u64).div_ceil(LANES));
+            pass.set_bind_group(2, &stage_group(gpu, &self.quads, &[(0, quads)], &[]), &[]);
+            dispatch(&mut pass, (*count as u64).div_ceil(LANES));
         }
         Ok(())
     }
@@ -65,31 +65,48 @@ impl Setup {
 /// The quads of a mesh.
 #[derive(Debug)]
 pub(super) struct MeshQuads {
-    /// None if there are none.
-    pub(super) buffer: Option<wgpu::Buffer>,
+    /// A table; none if there are none.
+    pub(super) table: Option<wgpu::TextureView>,
     pub(super) count: usize,
     /// Those with one triangle only.
     pub(super) lone: usize,
 }
 
 pub(super) fn upload(gpu: &Context, mesh: &Mesh, uploaded: &MeshUpload) -> Result<MeshQuads, GpuError> {
-    if mesh.triangles().len() >= quads::MOST_TRIANGLES {
-        return Err(GpuError::Limit {
-            what: "a mesh's triangles".into(),
-            size: mesh.triangles().len() as u64,
-            limit: quads::MOST_TRIANGLES as u64,
-            limit_name: "triangles that can be paired",
-        });
-    }
     let quads = quads::quads(mesh, uploaded.places.first_vertex);
     let (count, lone) = (quads.len(), quads::lone(&quads));
     if quads.is_empty() {
-        return Ok(MeshQuads { buffer: None, count, lone });
+        return Ok(MeshQuads { table: None, count, lone });
     }
-    let bytes: &[u8] = bytemuck::cast_slice(&quads);
-    let buffer = gpu.buffer("a mesh's quads", bytes.len() as u64, BufferUsages::STORAGE | BufferUsages::COPY_DST)?;
-    gpu.queue.write_buffer(&buffer, 0, bytes);
-    Ok(MeshQuads { buffer: Some(buffer), count, lone })
+    let groups = quads.iter().flat_map(|quad| {
+        let [a, b] = quad.triangles;
+        [quad.vertices, [a, b, count as u32, 0]]
+    });
+    let quads = table::upload(gpu, "a mesh's quads", 2 * count as u64, groups)?;
+    Ok(MeshQuads { table: Some(table::view(&quads)), count, lone })
+}
+
+/// Tables of a group a vertex: positions and u, normals and v, colours. The last is empty where no mesh has any.
+pub(super) fn upload_vertices(gpu: &Context, scene: &Scene) -> Result<[wgpu::TextureView; 3], GpuError> {
+    let group = |v: Vec4| v.to_array().map(f32::to_bits);
+    let count: u64 = scene.meshes().iter().map(|mesh| mesh.positions().len() as u64).sum();
+    let with_tex_coord = |mesh: &Mesh, i: usize, vector: Vec3, axis: usize| {
+        vector.extend(mesh.tex_coords().map_or(0.0, |tex_coords| tex_coords[i][axis]))
+    };
+    let meshes = || scene.meshes().iter().flat_map(|mesh| (0..mesh.positions().len()).map(move |i| (mesh, i)));
+    let positions = meshes().map(|(mesh, i)| with_tex_coord(mesh, i, mesh.positions()[i], 0));
+    let normals = meshes().map(|(mesh, i)| {
+        let normal = mesh.normals().map_or(Vec3::ZERO, |normals| normals[i]);
+        with_tex_coord(mesh, i, normal, 1)
+    });
+    let color_count = if scene.meshes().iter().any(|mesh| mesh.colors().is_some()) { count } else { 0 };
+    let colors = meshes().map(|(mesh, i)| mesh.colors().map_or(Vec4::ZERO, |colors| colors[i]));
+    let tables = [
+        table::upload(gpu, "the scene's positions", count, positions.map(group))?,
+        table::upload(gpu, "the scene's normals", count, normals.map(group))?,
+        table::upload(gpu, "the scene's colours", color_count, colors.take(color_count as usize).map(group))?,
+    ];
+    Ok(tables.each_ref().map(table::view))
 }
 
 /// Clips what set-up listed, and adds its pieces to the large triangles. Whether there was room for them.
@@ -101,7 +118,8 @@ pub(super) fn clip(frame: &mut Frame<'_>, stage: &Stage<'_>, header: &Header) ->
     // They come in any order.
     listed.sort_unstable();
     let draws = draws(frame.scene, frame.view)?;
-    let clipped = Clipped::new(&draws, &Viewport::of(frame.view), &listed, counts.records);
+    let draws = (&draws[..], &frame.surfaces.data[..]);
+    let clipped = Clipped::new(draws, &Viewport::of(frame.view), &listed, counts.records);
     let with_clipped = Counts {
         records: counts.records + clipped.records(),
         large: counts.large + clipped.triangles.len() as u32,
@@ -111,8 +129,7 @@ pub(super) fn clip(frame: &mut Frame<'_>, stage: &Stage<'_>, header: &Header) ->
         return Ok(false);
     }
     let queue = &gpu.queue;
-    let after = u64::from(counts.records) * RECORD_BYTES;
-    queue.write_buffer(&stage.buffers.records, after, bytemuck::cast_slice(&clipped.words));
+    table::write_from(gpu, &stage.buffers.records, work::record_groups(counts), &clipped.groups);
     let after = u64::from(first.large + counts.large) * 4;
     queue.write_buffer(work, after, bytemuck::cast_slice(&clipped.triangles));
     queue.write_buffer(work, 0, bytemuck::bytes_of(&with_clipped));

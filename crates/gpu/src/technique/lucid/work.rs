@@ -3,11 +3,13 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::record;
 use crate::gpu_data::{DrawData, flags};
 use crate::memory::Window;
 use crate::pass::ordered::OrderedPasses;
 use crate::pass::prefix_sum::PrefixSum;
 use crate::surface::Surfaces;
+use crate::table;
 
 /// Pixels along a side of a block, and of a bin.
 pub(super) const BLOCK: u64 = 8;
@@ -71,13 +73,14 @@ pub(super) const WRONG: &str = "pixels out of order";
 pub(super) const DISPATCHES: &str = "dispatches of bins and lists";
 pub(super) const DRAWS: &str = "all draws";
 
-/// Bytes of a triangle's record: four groups of four words.
-pub(super) const RECORD_BYTES: u64 = 64;
 const PART_BYTES: u64 = 16;
 const PLACE_BYTES: u64 = 12;
 const LISTED_BYTES: u64 = 12;
 /// Of a stored fragment.
 pub(super) const FRAGMENT_BYTES: u64 = 16;
+
+/// Groups of a draw in its table.
+pub(super) const DRAW_GROUPS: u64 = size_of::<DrawData>() as u64 / table::GROUP_BYTES;
 
 /// Words before the list of pixels out of order. Twin: `CLASSES` in `shaders/shared/classes.wesl`.
 const WRONG_HEADER: u64 = 5;
@@ -224,6 +227,11 @@ pub(super) fn header(room: &Counts) -> Header {
     Header { room: *room, first, ..Header::default() }
 }
 
+/// Groups of words that so much room for records has.
+pub(super) fn record_groups(room: &Counts) -> u64 {
+    u64::from(room.records) * u64::from(record::GROUPS)
+}
+
 /// All buffers of a window with so much room, and so many fragments.
 pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -> Vec<(&'static str, u64)> {
     let (_, words) = list_places(room);
@@ -232,7 +240,7 @@ pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -
     let chunks = (parts >> CHUNK_POWER) + blocks(window).min(parts) + 1;
     let mut needs = vec![
         (WORK, words * 4),
-        (RECORDS, u64::from(room.records) * RECORD_BYTES),
+        (RECORDS, table::bytes(record_groups(room))),
         (PARTS, parts * PART_BYTES),
         (PLACES, parts * PLACE_BYTES),
         (BLOCK_PARTS, starts * 4),
@@ -244,7 +252,7 @@ pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -
         (FRAGMENTS, fragments * FRAGMENT_BYTES),
         (WRONG, (WRONG_HEADER + pixels) * 4),
         (DISPATCHES, Dispatch::COUNT * 12),
-        (DRAWS, draws.max(1) * size_of::<DrawData>() as u64),
+        (DRAWS, table::bytes(draws * DRAW_GROUPS)),
     ];
     // Those of blocks take the same.
     needs.extend(PrefixSum::needs(pixels + 1));
@@ -302,7 +310,7 @@ mod tests {
         let fragments = 5_000_000;
         let bytes: u64 = needs(&room, fragments, window, 1).iter().map(|&(_, bytes)| bytes).sum();
         let formula = 16.9 * window.pixels() as f64
-            + 64.0 * f64::from(room.records)
+            + 80.0 * f64::from(room.records)
             + 73.1 * f64::from(room.parts)
             + 16.0 * fragments as f64;
         let share = bytes as f64 / formula;
