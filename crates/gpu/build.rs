@@ -89,15 +89,17 @@ fn main() {
         }
     }
     for stem in ["scatter", "dispatch", "sort", "cover"] {
-        linked.insert(format!("LUCID_{}", stem.to_uppercase()), link("technique::lucid", stem));
+        let features = [("lists_chunks", stem == "scatter"), ("sorts_parts", stem == "sort")];
+        let linked_text = compile(&path("technique::lucid", stem), None, &features);
+        linked.insert(format!("LUCID_{}", stem.to_uppercase()), linked_text);
     }
     for stem in ["setup", "bin"] {
         for (suffix, subgroups) in [("", false), ("_SUBGROUPS", true)] {
-            let linked_text = compile(&path("technique::lucid", stem), None, &[
-                ("subgroups", subgroups),
-                ("sets_up", stem == "setup"),
-                ("tables", true),
-            ]);
+            let linked_text = compile(
+                &path("technique::lucid", stem),
+                None,
+                &[("subgroups", subgroups), ("sets_up", stem == "setup"), ("tables", true)],
+            );
             linked.insert(format!("LUCID_{}{suffix}", stem.to_uppercase()), linked_text);
         }
     }

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use crate::technique::Outcome;
-use crate::{Context, GpuError};
+use crate::{Context, GpuError, table};
 
 /// A rectangle of pixels of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -199,6 +199,25 @@ impl Memory {
         self.textures.insert(name, texture.clone());
         self.peak_bytes = self.peak_bytes.max(self.held_bytes());
         Ok(texture)
+    }
+
+    /// The table of this name: the one there is if it is large enough and not twice too large; else a new one for exactly
+    /// `count` entries. Its content is undefined.
+    pub(crate) fn table(
+        &mut self,
+        gpu: &Context,
+        name: &'static str,
+        format: wgpu::TextureFormat,
+        count: u64,
+    ) -> Result<wgpu::TextureView, GpuError> {
+        let bytes = table::bytes(format, count);
+        if let Some(texture) = self.textures.get(name)
+            && texture.format() == format
+            && (bytes..=2 * bytes).contains(&texture_bytes(texture))
+        {
+            return Ok(table::view(texture));
+        }
+        self.texture(gpu, name, &table::descriptor(name, format, count)).map(|texture| table::view(&texture))
     }
 
     /// The storage buffer of this name: the one there is if it is large enough, not twice too large, and leaves room for

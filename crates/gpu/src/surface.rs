@@ -239,11 +239,6 @@ impl<'a> Surfaces<'a> {
         &self.scene.bind_group
     }
 
-    /// What is kept of the scene.
-    pub(crate) fn scene(&self) -> &'a SceneUpload {
-        self.scene
-    }
-
     /// All draws of transparent surfaces, in draw order.
     pub(crate) fn compute_draws(&self) -> impl Iterator<Item = ComputeDraw<'_>> {
         self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).map(|draw| ComputeDraw {

@@ -1,7 +1,7 @@
 //! Tables of groups of four words, in textures: what shaders read most, as llvmpipe fetches texels whole, and words of buffers
 //! lane by lane. Twin: `shaders/shared/table.wesl`.
 
-use wgpu::{Extent3d, TextureUsages};
+use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
 use crate::{Context, GpuError};
 
@@ -10,6 +10,10 @@ pub(crate) type Group = [u32; 4];
 
 pub(crate) const GROUP_BYTES: u64 = size_of::<Group>() as u64;
 
+/// What a table has: groups of four words, or pairs.
+pub(crate) const GROUPS: TextureFormat = TextureFormat::Rgba32Uint;
+pub(crate) const PAIRS: TextureFormat = TextureFormat::Rg32Uint;
+
 /// Groups in a row, and rows in a layer: as many as every device has.
 const WIDTH: u64 = 1024;
 const HEIGHT: u64 = 8192;
@@ -17,31 +21,32 @@ const HEIGHT: u64 = 8192;
 /// Groups that are written at once: whole rows, of which a layer is a multiple.
 const WRITTEN: usize = 256 * WIDTH as usize;
 
-/// A table with room for so many groups.
-pub(crate) fn descriptor(label: &str, groups: u64) -> wgpu::TextureDescriptor<'_> {
+/// A table with room for so many groups or pairs.
+pub(crate) fn descriptor(label: &str, format: TextureFormat, count: u64) -> wgpu::TextureDescriptor<'_> {
     wgpu::TextureDescriptor {
         label: Some(label),
-        size: size(groups),
+        size: size(count),
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Uint,
+        format,
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
     }
 }
 
-fn size(groups: u64) -> Extent3d {
-    let rows = groups.div_ceil(WIDTH).max(1);
+fn size(count: u64) -> Extent3d {
+    let rows = count.div_ceil(WIDTH).max(1);
     let layers = rows.div_ceil(HEIGHT);
     let height = if layers > 1 { HEIGHT } else { rows };
     Extent3d { width: WIDTH as u32, height: height as u32, depth_or_array_layers: layers as u32 }
 }
 
-/// Bytes of a table with room for so many groups.
-pub(crate) fn bytes(groups: u64) -> u64 {
-    let Extent3d { width, height, depth_or_array_layers } = size(groups);
-    u64::from(width) * u64::from(height) * u64::from(depth_or_array_layers) * GROUP_BYTES
+/// Bytes of a table with room for so many.
+pub(crate) fn bytes(format: TextureFormat, count: u64) -> u64 {
+    let Extent3d { width, height, depth_or_array_layers } = size(count);
+    let texels = u64::from(width) * u64::from(height) * u64::from(depth_or_array_layers);
+    texels * if format == PAIRS { GROUP_BYTES / 2 } else { GROUP_BYTES }
 }
 
 /// As shaders see it.
@@ -59,7 +64,7 @@ pub(crate) fn upload(
     count: u64,
     groups: impl IntoIterator<Item = Group>,
 ) -> Result<wgpu::Texture, GpuError> {
-    let descriptor = descriptor(label, count);
+    let descriptor = descriptor(label, GROUPS, count);
     let (layers, limit) = (descriptor.size.depth_or_array_layers, gpu.limits.max_texture_array_layers);
     if layers > limit {
         return Err(GpuError::Limit {

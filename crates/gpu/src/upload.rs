@@ -34,8 +34,6 @@ pub(crate) struct SceneUpload {
     pub(crate) meshes: Vec<MeshUpload>,
     pub(crate) bind_group: BindGroup,
     pub(crate) textures: Vec<BindGroup>,
-    /// Positions, attributes and indices, as in `bind_group`.
-    pub(crate) buffers: [wgpu::Buffer; 3],
     /// Where textures would lie in an atlas.
     pub(crate) atlas: AtlasLayout,
 }
@@ -87,7 +85,7 @@ impl SceneUpload {
             .collect::<Result<_, GpuError>>()?;
         gpu.check()?;
         let atlas = AtlasLayout::of(scene.textures());
-        Ok(Self { revision: scene.revision(), meshes, bind_group, textures, buffers, atlas })
+        Ok(Self { revision: scene.revision(), meshes, bind_group, textures, atlas })
     }
 }
 

@@ -32,7 +32,7 @@ const CLASSES: u64 = 5;
 const RUN_PX: u64 = 64;
 
 /// Workgroups in a row of a dispatch. Twin in `shaders/shared/classes.wesl`.
-const GRID_WIDTH: u64 = 32_768;
+const GRID_WIDTH: u64 = 1024;
 
 /// Runs that a workgroup classifies. Twin in `shaders/pass/classify.wesl`.
 const GROUP_RUNS: u64 = 64;

@@ -136,7 +136,7 @@ impl PrefixSum {
 
 /// In two dimensions, as one does not reach far enough.
 fn dispatch(pass: &mut wgpu::ComputePass<'_>, group: &wgpu::BindGroup, blocks: u64) {
-    const ROW: u64 = 32_768;
+    const ROW: u64 = 1024;
     pass.set_bind_group(0, group, &[]);
     pass.dispatch_workgroups(blocks.min(ROW) as u32, blocks.div_ceil(ROW) as u32, 1);
 }

@@ -6,13 +6,14 @@ use std::collections::HashMap;
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroupLayout, ComputePipeline, Features, ShaderModule};
 
+use super::layouts::Bound::{ReadWrite, Stored, Table};
 use super::work::{Dispatch, Shading, blocks};
 use super::{OwnLayouts, Stage, stage_group, stage_layout};
 use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::shader;
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// Long-lived half.
 #[derive(Debug)]
@@ -32,8 +33,19 @@ pub(super) struct Bin {
 
 impl Bin {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
-        let buffers = stage_layout(gpu, &[1], &[0, 2, 3, 4].map(|binding| (binding, false)));
-        let list_buffers = stage_layout(gpu, &[], &[0, 2, 3, 4, 5, 6, 9].map(|binding| (binding, false)));
+        let buffers = stage_layout(gpu, &[(0, ReadWrite), (1, Table), (2, ReadWrite), (3, ReadWrite), (4, ReadWrite)]);
+        let list_buffers = stage_layout(
+            gpu,
+            &[
+                (0, ReadWrite),
+                (2, ReadWrite),
+                (3, ReadWrite),
+                (4, ReadWrite),
+                (5, ReadWrite),
+                (9, ReadWrite),
+                (10, Stored(table::GROUPS)),
+            ],
+        );
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -52,7 +64,7 @@ impl Bin {
             list_parts: pipeline("lists", &scatter, "main", &list_buffers),
             buffers,
             list_buffers,
-            hide_buffers: stage_layout(gpu, &[1], &[(0, false), (2, false), (3, false)]),
+            hide_buffers: stage_layout(gpu, &[(0, ReadWrite), (1, Table), (2, ReadWrite), (3, ReadWrite)]),
             hide_module: shader(gpu, "hide", shaders::LUCID_HIDE),
             hide: HashMap::new(),
         }
@@ -82,7 +94,7 @@ impl Bin {
     ) -> Result<(), GpuError> {
         let buffers = stage.buffers;
         let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (4, &buffers.block_parts)];
-        let group = stage_group(frame.gpu, &self.buffers, &[(1, &buffers.record_view)], &bindings);
+        let group = stage_group(frame.gpu, &self.buffers, &[(1, &buffers.records)], &bindings);
         let mut pass = frame.compute_pass("bins")?;
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &stage.picture, &[]);
@@ -115,10 +127,9 @@ impl Bin {
             (3, &buffers.places),
             (4, &buffers.block_parts),
             (5, &buffers.lists),
-            (6, &buffers.chunks),
             (9, &buffers.chunk_sums),
         ];
-        let group = stage_group(frame.gpu, &self.list_buffers, &[], &bindings);
+        let group = stage_group(frame.gpu, &self.list_buffers, &[(10, &buffers.chunk_heads)], &bindings);
         let mut pass = frame.compute_pass("lists")?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
@@ -139,7 +150,7 @@ impl Bin {
         }
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places)];
-        let group = stage_group(gpu, &self.hide_buffers, &[(1, &buffers.record_view)], &bindings);
+        let group = stage_group(gpu, &self.hide_buffers, &[(1, &buffers.records)], &bindings);
         let pipeline = self.hide.entry((stage.shading, tests_depth, tests_alpha)).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.hide_buffers)];
             let [varies, smooth, flat] = stage.shading.constants();

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use pellucid_core::Resolve;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
 
+use super::layouts::Bound;
 use super::work::FILTER_SIZE;
 use super::{DepthFilter, stage_group, stage_layout};
 use crate::frame::Frame;
@@ -37,7 +38,7 @@ pub(super) struct Blend {
 
 impl Blend {
     pub(super) fn new(gpu: &Context, layouts: Layouts<'_>, ordered: &OrderedPasses, lfb: &BindGroupLayout) -> Self {
-        let wrong = stage_layout(gpu, &[], &[(0, false), (1, false)]);
+        let wrong = stage_layout(gpu, &[(0, Bound::ReadWrite), (1, Bound::ReadWrite)]);
         let module = shader(gpu, "blend", shaders::LUCID_BLEND);
         let (picture, classes) = (layouts.picture, ordered.classes_layout());
         let own = [Some(picture), Some(classes), Some(&wrong), Some(lfb)];

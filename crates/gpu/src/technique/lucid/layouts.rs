@@ -21,7 +21,7 @@ pub(super) struct OwnLayouts {
 impl OwnLayouts {
     pub(super) fn new(gpu: &Context) -> Self {
         let compute = ShaderStages::COMPUTE;
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None };
+        let own = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None };
         let texture =
             |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
         let uniform = BindingType::Buffer {
@@ -37,30 +37,22 @@ impl OwnLayouts {
         let layout = |label, entries: &[_]| {
             gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
+        let table = |binding| entry(binding, Bound::Table);
         let (flat, pages) = (wgpu::TextureViewDimension::D2, wgpu::TextureViewDimension::D2Array);
         let texels = wgpu::TextureSampleType::Float { filterable: false };
         Self {
             picture: layout(
                 "picture",
                 &[
-                    entry(0, uniform),
-                    entry(1, texture(texels, flat)),
-                    entry(2, texture(wgpu::TextureSampleType::Depth, flat)),
-                    entry(3, stored),
+                    own(0, uniform),
+                    own(1, texture(texels, flat)),
+                    own(2, texture(wgpu::TextureSampleType::Depth, flat)),
+                    own(3, stored),
                 ],
             ),
-            scene: layout(
-                "scene and draws",
-                &[
-                    table_entry(0),
-                    table_entry(1),
-                    table_entry(2),
-                    table_entry(3),
-                    entry(4, texture(texels, pages)),
-                ],
-            ),
+            scene: layout("scene and draws", &[table(0), table(1), table(2), table(3), own(4, texture(texels, pages))]),
             dispatches: layout("dispatches", &[storage_entry(0, compute, false)]),
-            work: stage_layout(gpu, &[], &[(0, false)]),
+            work: stage_layout(gpu, &[(0, Bound::ReadWrite)]),
         }
     }
 
@@ -82,39 +74,37 @@ impl OwnLayouts {
     }
 }
 
-/// A layout of tables and buffers by their bindings; buffers are read only or not.
-pub(super) fn stage_layout(gpu: &Context, tables: &[u32], buffers: &[(u32, bool)]) -> BindGroupLayout {
-    let mut entries: Vec<_> = tables.iter().map(|&binding| table_entry(binding)).collect();
-    let buffer = |&(binding, read_only): &(u32, bool)| storage_entry(binding, ShaderStages::COMPUTE, read_only);
-    entries.extend(buffers.iter().map(buffer));
+/// What is bound in group 3, and what a stage does with it.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Bound {
+    /// A table that is read.
+    Table,
+    /// A table of a format that is stored into, which excludes that it is read.
+    Stored(wgpu::TextureFormat),
+    Read,
+    ReadWrite,
+}
+
+/// A layout of tables and buffers by their bindings.
+pub(super) fn stage_layout(gpu: &Context, bindings: &[(u32, Bound)]) -> BindGroupLayout {
+    let entries: Vec<_> = bindings.iter().map(|&(binding, bound)| entry(binding, bound)).collect();
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
 }
 
-/// The same with a table that is stored into, as far as such an access is allowed: without reading it.
-pub(super) fn stored_table_layout(gpu: &Context, table: u32, buffers: &[(u32, bool)]) -> BindGroupLayout {
-    let mut entries = vec![wgpu::BindGroupLayoutEntry {
-        ty: BindingType::StorageTexture {
-            access: wgpu::StorageTextureAccess::WriteOnly,
-            format: wgpu::TextureFormat::Rgba32Uint,
-            view_dimension: wgpu::TextureViewDimension::D2Array,
-        },
-        ..table_entry(table)
-    }];
-    entries.extend(buffers.iter().map(|&(binding, only)| storage_entry(binding, ShaderStages::COMPUTE, only)));
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lucid"), entries: &entries })
-}
-
-fn table_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: ShaderStages::COMPUTE,
-        ty: BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
-            view_dimension: wgpu::TextureViewDimension::D2Array,
-            multisampled: false,
-        },
-        count: None,
-    }
+fn entry(binding: u32, bound: Bound) -> wgpu::BindGroupLayoutEntry {
+    let compute = ShaderStages::COMPUTE;
+    let view_dimension = wgpu::TextureViewDimension::D2Array;
+    let ty = match bound {
+        Bound::Read => return storage_entry(binding, compute, true),
+        Bound::ReadWrite => return storage_entry(binding, compute, false),
+        Bound::Table => {
+            BindingType::Texture { sample_type: wgpu::TextureSampleType::Uint, view_dimension, multisampled: false }
+        }
+        Bound::Stored(format) => {
+            BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension }
+        }
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None }
 }
 
 pub(super) fn stage_group(
@@ -133,7 +123,6 @@ fn group<'a>(
     layout: &BindGroupLayout,
     resources: impl Iterator<Item = (u32, wgpu::BindingResource<'a>)>,
 ) -> BindGroup {
-    let entries: Vec<_> =
-        resources.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+    let entries: Vec<_> = resources.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lucid"), layout, entries: &entries })
 }

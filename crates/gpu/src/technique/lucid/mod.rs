@@ -65,8 +65,8 @@ use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, TextureView};
 
 use self::layouts::{OwnLayouts, stage_group, stage_layout};
 use self::work::{
-    BLOCK_PARTS, CHUNK_SUMS, CHUNKS, Counts, DISPATCHES, DRAW_GROUPS, DRAWS, FRAGMENT_BYTES, FRAGMENTS, Header, LISTS, OFFSETS,
-    ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
+    BLOCK_PARTS, CHUNK_HEADS, CHUNK_SUMS, CHUNKS, COVERING, Counts, DISPATCHES, DRAW_GROUPS, DRAWS, FRAGMENT_BYTES,
+    FRAGMENTS, Header, LISTS, OFFSETS, ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
 };
 use super::growth::most_that_fits;
 use super::{Capture, Layouts, Outcome};
@@ -146,19 +146,19 @@ impl LoadedScene {
     }
 }
 
-/// Buffers of a window.
+/// Buffers and tables of a window.
 struct Buffers {
     work: wgpu::Buffer,
-    /// A table.
-    records: wgpu::Texture,
-    record_view: TextureView,
+    records: TextureView,
     parts: wgpu::Buffer,
     places: wgpu::Buffer,
     block_parts: wgpu::Buffer,
     lists: wgpu::Buffer,
+    chunk_heads: TextureView,
     chunks: wgpu::Buffer,
     chunk_sums: wgpu::Buffer,
-    ordered: wgpu::Buffer,
+    ordered: TextureView,
+    covering: TextureView,
     offsets: wgpu::Buffer,
     wrong: wgpu::Buffer,
     dispatches: wgpu::Buffer,
@@ -252,36 +252,41 @@ impl Lucid {
         let needs = work::needs(room, 0, window, draws);
         // Fragments of the frame before stay where they are, unless they are in the way.
         frame.memory.make_room(&needs);
-        let records = work::record_groups(room);
-        let records = frame.memory.texture(gpu, RECORDS, &table::descriptor(RECORDS, records))?;
-        let all_draws = frame.memory.texture(gpu, DRAWS, &table::descriptor(DRAWS, draws * DRAW_GROUPS))?;
+        let chunks = work::chunks(room, window);
+        let mut table = |name, format, count| frame.memory.table(gpu, name, format, count);
+        let records = table(RECORDS, table::GROUPS, work::record_groups(room))?;
+        let ordered = table(ORDERED, table::GROUPS, room.parts.into())?;
+        let chunk_heads = table(CHUNK_HEADS, table::GROUPS, chunks + 1)?;
+        let covering = table(COVERING, table::PAIRS, chunks * work::CHUNK_WORDS)?;
+        let all_draws = table(DRAWS, table::GROUPS, draws * DRAW_GROUPS)?;
         let mut buffer = |name| {
             let bytes = needs.iter().find(|&&(other, _)| other == name).map_or(0, |&(_, bytes)| bytes);
             frame.memory.buffer(gpu, name, bytes)
         };
         let buffers = Buffers {
             work: buffer(WORK)?,
-            record_view: table::view(&records),
             records,
             parts: buffer(PARTS)?,
             places: buffer(PLACES)?,
             block_parts: buffer(BLOCK_PARTS)?,
             lists: buffer(LISTS)?,
+            chunk_heads,
             chunks: buffer(CHUNKS)?,
             chunk_sums: buffer(CHUNK_SUMS)?,
-            ordered: buffer(ORDERED)?,
+            ordered,
+            covering,
             offsets: buffer(OFFSETS)?,
             wrong: buffer(WRONG)?,
             dispatches: buffer(DISPATCHES)?,
         };
         frame.submit()?;
         gpu.queue.write_buffer(&buffers.work, 0, bytemuck::bytes_of(&work::header(room)));
-        table::write(gpu, &all_draws, bytemuck::cast_slice(&frame.surfaces.data).iter().copied());
+        table::write(gpu, all_draws.texture(), bytemuck::cast_slice(&frame.surfaces.data).iter().copied());
         let Some(scene) = &self.scene else { unreachable!("it was loaded") };
         let stage = Stage {
             window,
             picture: self.layouts.picture_group(frame),
-            scene: self.layouts.scene_group(gpu, scene, &table::view(&all_draws)),
+            scene: self.layouts.scene_group(gpu, scene, &all_draws),
             shading: Shading::of(&frame.surfaces),
             buffers: &buffers,
         };
@@ -369,7 +374,11 @@ impl Lucid {
 
     fn set_dispatch_groups(&self, pass: &mut wgpu::ComputePass<'_>, frame: &Frame<'_>, stage: &Stage<'_>) {
         let gpu = frame.gpu;
-        pass.set_bind_group(2, &stage_group(gpu, &self.layouts.dispatches, &[], &[(0, &stage.buffers.dispatches)]), &[]);
+        pass.set_bind_group(
+            2,
+            &stage_group(gpu, &self.layouts.dispatches, &[], &[(0, &stage.buffers.dispatches)]),
+            &[],
+        );
         pass.set_bind_group(3, &stage_group(gpu, &self.layouts.work, &[], &[(0, &stage.buffers.work)]), &[]);
     }
 }

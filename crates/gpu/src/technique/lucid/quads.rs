@@ -204,7 +204,8 @@ mod tests {
             assert_eq!(2 * quads.len() - lone(&quads), count);
             paired += quads.len() - lone(&quads);
             // No two that are alone could be one.
-            let alone: Vec<u32> = quads.iter().filter(|quad| quad.triangles[1] == NO_TRIANGLE).map(|quad| quad.triangles[0]).collect();
+            let alone: Vec<u32> =
+                quads.iter().filter(|quad| quad.triangles[1] == NO_TRIANGLE).map(|quad| quad.triangles[0]).collect();
             let is_left = |candidate: &Candidate| candidate.triangles.iter().all(|triangle| alone.contains(triangle));
             assert!(!candidates(&mesh).iter().any(is_left), "not maximal");
         }

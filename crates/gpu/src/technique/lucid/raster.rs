@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use wgpu::{BindGroupLayout, ComputePipeline, ShaderModule};
 
+use super::layouts::Bound::{Read, ReadWrite, Stored, Table};
 use super::work::{Counts, Dispatch, Header, Shading};
 use super::{OwnLayouts, Stage, stage_group, stage_layout};
 use crate::fbuffer::{LANES, dispatch};
@@ -11,7 +12,7 @@ use crate::frame::Frame;
 use crate::pass::ordered::compute_pipeline;
 use crate::pass::picture::GROUP_PX;
 use crate::surface::shader;
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// Invocations of a workgroup in chunks.
 const CHUNKS_A_GROUP: u64 = 2;
@@ -35,8 +36,14 @@ pub(super) struct Raster {
 
 impl Raster {
     pub(super) fn new(gpu: &Context, layouts: &OwnLayouts) -> Self {
-        let sort_buffers = stage_layout(gpu, &[], &[0, 2, 3, 5, 6, 7].map(|binding| (binding, false)));
-        let cover_buffers = stage_layout(gpu, &[], &[(6, false), (7, true), (8, false), (9, true)]);
+        let sort_buffers = stage_layout(
+            gpu,
+            &[(0, ReadWrite), (2, ReadWrite), (3, ReadWrite), (5, ReadWrite), (7, Stored(table::GROUPS)), (10, Table)],
+        );
+        let cover_buffers = stage_layout(
+            gpu,
+            &[(6, ReadWrite), (7, Table), (8, ReadWrite), (9, Read), (10, Table), (11, Stored(table::PAIRS))],
+        );
         let pipeline = |label, module: &_, entry, buffers: &BindGroupLayout| {
             let layouts = [Some(&layouts.picture), None, None, Some(buffers)];
             compute_pipeline(gpu, label, module, entry, &layouts, &[])
@@ -55,7 +62,7 @@ impl Raster {
             count_fragments: pipeline("cover", &cover, "count_fragments", &cover_buffers),
             place_fragments: pipeline("places", &cover, "place_fragments", &cover_buffers),
             cover_buffers,
-            shade_buffers: stage_layout(gpu, &[1], &[(6, true), (7, true), (9, false)]),
+            shade_buffers: stage_layout(gpu, &[(1, Table), (7, Table), (9, ReadWrite), (10, Table), (11, Table)]),
             shade_module: shader(gpu, "shade", shaders::LUCID_RASTER),
             shade: HashMap::new(),
         }
@@ -84,15 +91,9 @@ impl Raster {
 
     fn sort_pass(&self, frame: &mut Frame<'_>, stage: &Stage<'_>) -> Result<wgpu::ComputePass<'static>, GpuError> {
         let buffers = stage.buffers;
-        let bindings = [
-            (0, &buffers.work),
-            (2, &buffers.parts),
-            (3, &buffers.places),
-            (5, &buffers.lists),
-            (6, &buffers.chunks),
-            (7, &buffers.ordered),
-        ];
-        let group = stage_group(frame.gpu, &self.sort_buffers, &[], &bindings);
+        let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (5, &buffers.lists)];
+        let tables = [(7, &buffers.ordered), (10, &buffers.chunk_heads)];
+        let group = stage_group(frame.gpu, &self.sort_buffers, &tables, &bindings);
         let mut pass = frame.compute_pass("sort")?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);
@@ -123,8 +124,9 @@ impl Raster {
         drop(pass);
 
         let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let bindings = [(6, &buffers.chunks), (7, &buffers.ordered), (9, fragments)];
-        let group = stage_group(gpu, &self.shade_buffers, &[(1, &buffers.record_view)], &bindings);
+        let tables =
+            [(1, &buffers.records), (7, &buffers.ordered), (10, &buffers.chunk_heads), (11, &buffers.covering)];
+        let group = stage_group(gpu, &self.shade_buffers, &tables, &[(9, fragments)]);
         let pipeline = self.shade.entry(stage.shading).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.shade_buffers)];
             compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &stage.shading.constants())
@@ -145,8 +147,9 @@ impl Raster {
         step: &'static str,
     ) -> Result<wgpu::ComputePass<'static>, GpuError> {
         let buffers = stage.buffers;
-        let bindings = [(6, &buffers.chunks), (7, &buffers.ordered), (8, &buffers.offsets), (9, &buffers.chunk_sums)];
-        let group = stage_group(frame.gpu, &self.cover_buffers, &[], &bindings);
+        let tables = [(7, &buffers.ordered), (10, &buffers.chunk_heads), (11, &buffers.covering)];
+        let bindings = [(6, &buffers.chunks), (8, &buffers.offsets), (9, &buffers.chunk_sums)];
+        let group = stage_group(frame.gpu, &self.cover_buffers, &tables, &bindings);
         let mut pass = frame.compute_pass(step)?;
         pass.set_bind_group(0, &stage.picture, &[]);
         pass.set_bind_group(3, &group, &[]);

@@ -6,8 +6,8 @@ use pellucid_core::primitive::draws;
 use pellucid_core::{Mesh, Scene};
 use wgpu::{BindGroupLayout, ComputePipeline, Features};
 
+use super::layouts::Bound::{ReadWrite, Stored, Table};
 use super::record::Clipped;
-use super::layouts::stored_table_layout;
 use super::work::{self, Counts, Header};
 use super::{LoadedScene, Stage, quads, stage_group, stage_layout};
 use crate::fbuffer::dispatch;
@@ -32,8 +32,11 @@ pub(super) struct Setup {
 
 impl Setup {
     pub(super) fn new(gpu: &Context, surfaces: &SurfaceLayouts) -> Self {
-        let (vertices, quads) = (stage_layout(gpu, &[0], &[]), stage_layout(gpu, &[0], &[]));
-        let buffers = stored_table_layout(gpu, 1, &[0, 2, 3, 4].map(|binding| (binding, false)));
+        let (vertices, quads) = (stage_layout(gpu, &[(0, Table)]), stage_layout(gpu, &[(0, Table)]));
+        let buffers = stage_layout(
+            gpu,
+            &[(0, ReadWrite), (1, Stored(table::GROUPS)), (2, ReadWrite), (3, ReadWrite), (4, ReadWrite)],
+        );
         let has_subgroups = gpu.has(Features::SUBGROUP);
         let wgsl = if has_subgroups { shaders::LUCID_SETUP_SUBGROUPS } else { shaders::LUCID_SETUP };
         let module = shader(gpu, "set-up", wgsl);
@@ -47,7 +50,7 @@ impl Setup {
         let (gpu, buffers) = (frame.gpu, stage.buffers);
         let vertices = stage_group(gpu, &self.vertices, &[(0, &scene.vertices[0])], &[]);
         let bindings = [(0, &buffers.work), (2, &buffers.parts), (3, &buffers.places), (4, &buffers.block_parts)];
-        let group = stage_group(gpu, &self.buffers, &[(1, &buffers.record_view)], &bindings);
+        let group = stage_group(gpu, &self.buffers, &[(1, &buffers.records)], &bindings);
         let mut pass = frame.compute_pass("set-up")?;
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(1, &vertices, &[]);
@@ -129,7 +132,7 @@ pub(super) fn clip(frame: &mut Frame<'_>, stage: &Stage<'_>, header: &Header) ->
         return Ok(false);
     }
     let queue = &gpu.queue;
-    table::write_from(gpu, &stage.buffers.records, work::record_groups(counts), &clipped.groups);
+    table::write_from(gpu, stage.buffers.records.texture(), work::record_groups(counts), &clipped.groups);
     let after = u64::from(first.large + counts.large) * 4;
     queue.write_buffer(work, after, bytemuck::cast_slice(&clipped.triangles));
     queue.write_buffer(work, 0, bytemuck::bytes_of(&with_clipped));

@@ -22,7 +22,7 @@ const FAN: u64 = 3;
 pub(super) const LEVELS: usize = 7;
 
 /// Words of a chunk. Twin: `CHUNK_WORDS`.
-const CHUNK_WORDS: u64 = 136;
+pub(super) const CHUNK_WORDS: u64 = 64;
 
 /// The constant `filter_size` of `shaders/technique/lucid/filter.wesl` by its number, as names of imported modules change when
 /// they are linked.
@@ -64,7 +64,9 @@ pub(super) const PARTS: &str = "parts of triangles";
 pub(super) const PLACES: &str = "places of parts";
 pub(super) const BLOCK_PARTS: &str = "blocks' parts";
 pub(super) const LISTS: &str = "lists of parts";
-pub(super) const CHUNKS: &str = "chunks of parts";
+pub(super) const CHUNK_HEADS: &str = "chunks of parts";
+pub(super) const CHUNKS: &str = "chunks' pixels";
+pub(super) const COVERING: &str = "fragments before chunks";
 pub(super) const CHUNK_SUMS: &str = "blocks' chunks";
 pub(super) const ORDERED: &str = "parts in order";
 pub(super) const OFFSETS: &str = "offsets";
@@ -232,27 +234,33 @@ pub(super) fn record_groups(room: &Counts) -> u64 {
     u64::from(room.records) * u64::from(record::GROUPS)
 }
 
+/// Chunks that so much room for parts allows: of each block one that is not full, at most.
+pub(super) fn chunks(room: &Counts, window: Window) -> u64 {
+    (u64::from(room.parts) >> CHUNK_POWER) + blocks(window).min(room.parts.into())
+}
+
 /// All buffers of a window with so much room, and so many fragments.
 pub(super) fn needs(room: &Counts, fragments: u64, window: Window, draws: u64) -> Vec<(&'static str, u64)> {
     let (_, words) = list_places(room);
     let (parts, starts, pixels) = (u64::from(room.parts), blocks(window) + 1, window.pixels());
-    // Of each block one that is not full, at most; and one after the last, as many as a workgroup has.
-    let chunks = (parts >> CHUNK_POWER) + blocks(window).min(parts) + 1;
+    let chunks = chunks(room, window);
     let mut needs = vec![
         (WORK, words * 4),
-        (RECORDS, table::bytes(record_groups(room))),
+        (RECORDS, table::bytes(table::GROUPS, record_groups(room))),
         (PARTS, parts * PART_BYTES),
         (PLACES, parts * PLACE_BYTES),
         (BLOCK_PARTS, starts * 4),
         (LISTS, parts * LISTED_BYTES),
+        (CHUNK_HEADS, table::bytes(table::GROUPS, chunks + 1)),
         (CHUNKS, chunks * CHUNK_WORDS * 4),
+        (COVERING, table::bytes(table::PAIRS, chunks * CHUNK_WORDS)),
         (CHUNK_SUMS, starts * 4),
-        (ORDERED, parts * PART_BYTES),
+        (ORDERED, table::bytes(table::GROUPS, parts)),
         (OFFSETS, (pixels + 1) * 4),
         (FRAGMENTS, fragments * FRAGMENT_BYTES),
         (WRONG, (WRONG_HEADER + pixels) * 4),
         (DISPATCHES, Dispatch::COUNT * 12),
-        (DRAWS, table::bytes(draws * DRAW_GROUPS)),
+        (DRAWS, table::bytes(table::GROUPS, draws * DRAW_GROUPS)),
     ];
     // Those of blocks take the same.
     needs.extend(PrefixSum::needs(pixels + 1));
@@ -296,7 +304,7 @@ mod tests {
         }
         assert_eq!((constant(WORK, "BLOCK"), constant(WORK, "BIN")), (BLOCK, BIN));
         assert_eq!((constant(CHUNKS, "CHUNK"), constant(CHUNKS, "CHUNK_WORDS")), (1 << CHUNK_POWER, CHUNK_WORDS));
-        assert_eq!(constant(CHUNKS, "CHUNK_HEAD") + 2 * BLOCK * BLOCK, CHUNK_WORDS);
+        assert_eq!(BLOCK * BLOCK, CHUNK_WORDS);
         assert_eq!((constant(SORT, "FAN"), constant(SORT, "CHUNK_POWER")), (FAN, CHUNK_POWER));
         assert_eq!(constant(SORT, "LEVELS"), LEVELS as u64);
         assert_eq!(constant(CLASSES, "CLASSES"), WRONG_HEADER);
