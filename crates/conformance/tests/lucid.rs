@@ -225,3 +225,46 @@ fn twelve_million_triangles_agree_with_the_cpu() {
     let differing = pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1.0 / 255.0).count();
     assert!(differing * 1000 < frame.image.pixels().len(), "{differing} pixels differ");
 }
+
+/// Files of the folder in `PELLUCID_SCENES`, with subgroups where the device has them and without: skipped with a notice where they
+/// are not there.
+#[test]
+fn real_scenes_agree_with_the_oracle_at_any_filter() {
+    let Some(folder) = std::env::var_os("PELLUCID_SCENES") else {
+        return eprintln!("skipped: set PELLUCID_SCENES to a folder of scenes");
+    };
+    let mut scenes = Vec::new();
+    for path in [
+        "stanford_bunny/bunny_69k.ply",
+        "stanford_dragon/dragon_871k.ply",
+        "sintel_hair/sintel_hair_tubes.ply",
+        "crytek_sponza/crytek_sponza.glb",
+        "oak_tree/oak_tree.glb",
+        "conference_room/conference.glb",
+        "brain/brain_fsaverage5.glb",
+    ] {
+        let file = std::path::Path::new(&folder).join(path);
+        if !file.exists() {
+            eprintln!("skipped: there is no '{}'", file.display());
+            continue;
+        }
+        let scene = pellucid::load_file(&file).unwrap().scene;
+        let view = View::of(&scene).size(96, 64).opacity(0.5);
+        scenes.push((path, prepared(scene, view)));
+    }
+    let mut failures = Vec::new();
+    for (floor, size) in [false, true].into_iter().flat_map(|floor| [1, 3, 8].map(|size| (floor, size))) {
+        let Some(gpu) = gpu(floor) else { return };
+        let candidate = Candidate::new(Technique::Lucid, Renderer::new().gpu(gpu.depth_filter(filter(size))));
+        for (path, prepared) in &scenes {
+            for check in [Check::Layers, Check::Picture(Resolve::Blend)] {
+                let comparison = prepared.run(check, &candidate).unwrap();
+                eprintln!("{path}, floor: {floor}, filter of {size}, {check}: {comparison:?}");
+                if !comparison.passes() {
+                    failures.push(format!("{path}, floor: {floor}, filter of {size}, {check}: {comparison:?}"));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}

@@ -120,7 +120,7 @@ impl Technique {
                 "8 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
             }
             Self::Lucid => {
-                "16.9 B x pixels + 64 B x visible triangles + 73 B x their parts in blocks of 8 x 8 pixels + 16 B x fragments"
+                "20.7 B x pixels + 80 B x visible triangles + 81 B x their parts in blocks of 8 x 8 pixels + 16 B x fragments"
             }
         }
     }

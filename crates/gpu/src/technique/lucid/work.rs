@@ -317,9 +317,9 @@ mod tests {
         let room = Counts { records: 1 << 20, parts: 1 << 21, ..Counts::default() };
         let fragments = 5_000_000;
         let bytes: u64 = needs(&room, fragments, window, 1).iter().map(|&(_, bytes)| bytes).sum();
-        let formula = 16.9 * window.pixels() as f64
+        let formula = 20.7 * window.pixels() as f64
             + 80.0 * f64::from(room.records)
-            + 73.1 * f64::from(room.parts)
+            + 80.7 * f64::from(room.parts)
             + 16.0 * fragments as f64;
         let share = bytes as f64 / formula;
         assert!((0.99..1.01).contains(&share), "{bytes} bytes, {share} of the formula");
