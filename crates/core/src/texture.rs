@@ -79,6 +79,7 @@ pub struct MipLevel {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Texture {
     levels: Vec<MipLevel>,
+    is_opaque: bool,
     sampler: Sampler,
 }
 
@@ -132,12 +133,18 @@ impl Texture {
                 levels.push(smaller);
             }
         }
-        Ok(Self { levels, sampler })
+        let is_opaque = levels.iter().all(|level| level.texels.iter().all(|texel| texel[3] == u8::MAX));
+        Ok(Self { levels, is_opaque, sampler })
     }
 
     /// All levels, the full size first.
     pub fn levels(&self) -> &[MipLevel] {
         &self.levels
+    }
+
+    /// Whether every texel of every level is opaque.
+    pub fn is_opaque(&self) -> bool {
+        self.is_opaque
     }
 
     /// How it is sampled.

@@ -1,7 +1,5 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
-use glam::Vec4;
-
 use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
 
@@ -19,8 +17,9 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
-    /// Colours of those that were shaded when they were captured.
-    colors: Vec<Vec4>,
+    /// Colours of those that were shaded when they were captured; beyond `color_count` is room.
+    colors: Vec<[f32; 4]>,
+    color_count: usize,
 }
 
 /// One of them.
@@ -43,6 +42,17 @@ pub(crate) struct Room<'a> {
     pub(crate) primitives: &'a mut [u32],
 }
 
+/// Where a vector of shaded fragments can be put.
+pub(crate) struct Shaded<'a> {
+    pub(crate) samples: &'a mut [u32],
+    pub(crate) depths: &'a mut [f32],
+    pub(crate) sources: &'a mut [u32],
+    /// The source of the first; that of each other is one more.
+    pub(crate) first_source: u32,
+    /// Four channels of each.
+    pub(crate) colors: &'a mut [f32],
+}
+
 impl Default for Fragments {
     fn default() -> Self {
         let mut fragments = Self {
@@ -53,6 +63,7 @@ impl Default for Fragments {
             sources: Vec::new(),
             primitives: Vec::new(),
             colors: Vec::new(),
+            color_count: 0,
         };
         fragments.make_room(1);
         fragments
@@ -62,7 +73,7 @@ impl Default for Fragments {
 impl Fragments {
     pub(crate) fn clear(&mut self) {
         self.end = 1;
-        self.colors.clear();
+        self.color_count = 0;
     }
 
     #[inline(always)]
@@ -112,27 +123,39 @@ impl Fragments {
         self.end += 1;
     }
 
-    /// The samples and lights of the vector of fragments that begins at a number, of which some may not be there.
+    /// Room for whole vectors up to this number, although fragments may end before, and for as many colours.
     #[inline(always)]
-    pub(crate) fn lanes(&mut self, first: usize) -> (&[u32; SHADED_LANES], &[f32; SHADED_LANES]) {
-        if self.depths.len() < first + SHADED_LANES {
-            self.grow(SHADED_LANES);
+    pub(crate) fn make_room_to_shade(&mut self, end: usize) {
+        if self.depths.len() < end {
+            self.grow(end - self.end);
         }
-        (
-            self.samples[first..].first_chunk().unwrap_or(&[0; SHADED_LANES]),
-            self.lights[first..].first_chunk().unwrap_or(&[0.0; SHADED_LANES]),
-        )
+        let color_count = self.color_count + SHADED_LANES;
+        if self.colors.len() < color_count {
+            self.colors.resize(color_count.next_power_of_two().max(4096), [0.0; 4]);
+        }
     }
 
-    /// Gives the fragment of number `from` a colour that is lit already, and the number `to`, which is not higher.
+    /// Samples, depths and lights of the vector of fragments that begins at a number, some of which may not be there.
     #[inline(always)]
-    pub(crate) fn shaded(&mut self, from: usize, to: usize, color: Vec4) {
-        self.samples[to] = self.samples[from];
-        self.depths[to] = self.depths[from];
-        self.lights[to] = 1.0;
-        self.sources[to] = self.colors.len() as u32 | COLOR;
-        self.primitives[to] = self.primitives[from];
-        self.colors.push(color);
+    pub(crate) fn to_shade(&self, first: usize) -> (&[u32], &[f32], &[f32]) {
+        let range = first..first + SHADED_LANES;
+        (&self.samples[range.clone()], &self.depths[range.clone()], &self.lights[range])
+    }
+
+    /// Where a vector of shaded fragments goes, the first `count` of which are there: samples, depths and sources from a
+    /// number on, which is not above that they had, and colours.
+    #[inline(always)]
+    pub(crate) fn shaded(&mut self, first: usize, count: usize) -> Shaded<'_> {
+        let range = first..first + SHADED_LANES;
+        let colors = self.color_count..self.color_count + SHADED_LANES;
+        self.color_count += count;
+        Shaded {
+            samples: &mut self.samples[range.clone()],
+            depths: &mut self.depths[range.clone()],
+            sources: &mut self.sources[range],
+            first_source: colors.start as u32 | COLOR,
+            colors: self.colors[colors].as_flattened_mut(),
+        }
     }
 
     /// The number that the next fragment gets.
@@ -176,8 +199,8 @@ impl Fragments {
 
     /// Brightness and source of each, number 0 among them, dark and without source; and the colours of those shaded.
     #[inline(always)]
-    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32], &[Vec4]) {
-        (&self.lights[..self.end], &self.sources[..self.end], &self.colors)
+    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32], &[[f32; 4]]) {
+        (&self.lights[..self.end], &self.sources[..self.end], &self.colors[..self.color_count])
     }
 
     #[inline(always)]
@@ -192,12 +215,12 @@ impl Fragments {
     }
 
     /// The colours of those shaded.
-    pub(crate) fn colors(&self) -> &[Vec4] {
-        &self.colors
+    pub(crate) fn colors(&self) -> &[[f32; 4]] {
+        &self.colors[..self.color_count]
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<Vec4>()
+        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<[f32; 4]>()
     }
 }

@@ -342,7 +342,7 @@ impl TileCapture {
             return self.surfaces.color(source & !SURFACE, x, y, frame.draws);
         }
         if source & COLOR != 0 {
-            return self.fragments.colors().get((source & !COLOR) as usize).copied();
+            return self.fragments.colors().get((source & !COLOR) as usize).copied().map(Vec4::from_array);
         }
         Some(lit(frame.palette[source as usize], light))
     }
