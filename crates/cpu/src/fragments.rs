@@ -1,5 +1,7 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
+use fearless_simd::{Simd, SimdBase, f32x8, mask32x8, u32x8};
+
 use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
 
@@ -42,10 +44,8 @@ pub(crate) struct Room<'a> {
     pub(crate) primitives: &'a mut [u32],
 }
 
-/// Where a vector of shaded fragments can be put.
+/// Where what a vector of fragments gets when it is shaded can be put.
 pub(crate) struct Shaded<'a> {
-    pub(crate) samples: &'a mut [u32],
-    pub(crate) depths: &'a mut [f32],
     pub(crate) sources: &'a mut [u32],
     /// The source of the first; that of each other is one more.
     pub(crate) first_source: u32,
@@ -123,36 +123,51 @@ impl Fragments {
         self.end += 1;
     }
 
-    /// Room for whole vectors up to this number, although fragments may end before, and for as many colours.
+    /// Room for so many numbers beyond the last, so that whole vectors can be read and written.
     #[inline(always)]
-    pub(crate) fn make_room_to_shade(&mut self, end: usize) {
-        if self.depths.len() < end {
-            self.grow(end - self.end);
-        }
-        let color_count = self.color_count + SHADED_LANES;
-        if self.colors.len() < color_count {
-            self.colors.resize(color_count.next_power_of_two().max(4096), [0.0; 4]);
+    pub(crate) fn make_room_after(&mut self, count: usize) {
+        self.make_room(count);
+    }
+
+    /// Room for so many colours.
+    #[inline(always)]
+    pub(crate) fn make_room_for_colors(&mut self, count: usize) {
+        let room = self.color_count + count;
+        if self.colors.len() < room {
+            self.colors.resize(room.next_power_of_two().max(4096), [0.0; 4]);
         }
     }
 
-    /// Samples, depths and lights of the vector of fragments that begins at a number, some of which may not be there.
+    /// The samples of the vector of fragments that begins at a number, some of which may not be there.
     #[inline(always)]
-    pub(crate) fn to_shade(&self, first: usize) -> (&[u32], &[f32], &[f32]) {
-        let range = first..first + SHADED_LANES;
-        (&self.samples[range.clone()], &self.depths[range.clone()], &self.lights[range])
+    pub(crate) fn samples_from(&self, first: usize) -> &[u32] {
+        &self.samples[first..first + SHADED_LANES]
     }
 
-    /// Where a vector of shaded fragments goes, the first `count` of which are there: samples, depths and sources from a
-    /// number on, which is not above that they had, and colours.
+    /// The lights of such a vector.
+    #[inline(always)]
+    pub(crate) fn lights_from(&self, first: usize) -> &[f32] {
+        &self.lights[first..first + SHADED_LANES]
+    }
+
+    /// Of the vector of fragments that begins at number `from`, gives some the numbers from `to` on, which is not above
+    /// `from`. Their colours and sources are still to come.
+    #[inline(always)]
+    pub(crate) fn keep<S: Simd>(&mut self, simd: S, from: usize, to: usize, kept: mask32x8<S>) {
+        let (from, to) = (from..from + SHADED_LANES, to..to + SHADED_LANES);
+        for numbers in [&mut self.samples, &mut self.primitives] {
+            u32x8::from_slice(simd, &numbers[from.clone()]).compress(kept).store_slice(&mut numbers[to.clone()]);
+        }
+        f32x8::from_slice(simd, &self.depths[from]).compress(kept).store_slice(&mut self.depths[to]);
+    }
+
+    /// Where sources and colours of a vector of shaded fragments go, the first `count` of which are there.
     #[inline(always)]
     pub(crate) fn shaded(&mut self, first: usize, count: usize) -> Shaded<'_> {
-        let range = first..first + SHADED_LANES;
         let colors = self.color_count..self.color_count + SHADED_LANES;
         self.color_count += count;
         Shaded {
-            samples: &mut self.samples[range.clone()],
-            depths: &mut self.depths[range.clone()],
-            sources: &mut self.sources[range],
+            sources: &mut self.sources[first..first + SHADED_LANES],
             first_source: colors.start as u32 | COLOR,
             colors: self.colors[colors].as_flattened_mut(),
         }

@@ -1,6 +1,6 @@
 //! Colours that vary over a triangle, eight fragments at a time.
 //!
-//! Fragments are shaded as soon as a triangle is captured, while what they have in common is at hand: its planes, one
+//! Fragments are shaded as soon as some triangles of a draw are captured, while what they have in common is at hand: one
 //! texture, and texels next to each other. Shading after the sort, when it is known what is hidden, saves little where
 //! surfaces are translucent, and jumps from texture to texture. The operations are those of [`Varying::color_at`], in the
 //! same order.
@@ -19,6 +19,7 @@ use pellucid_core::texture::{Filter, MipLevel, TexelValues, Wrap};
 
 use crate::bin::TILE_PX;
 use crate::fragments::Fragments;
+use crate::tile::TILE_SAMPLES;
 
 /// Fragments shaded at a time.
 pub(crate) const SHADED_LANES: usize = 8;
@@ -34,69 +35,157 @@ pub(crate) struct VaryingSurface<'a> {
     pub(crate) top: i32,
 }
 
-impl VaryingSurface<'_> {
-    /// Shades the fragments from number `first` on, all of this surface, and leaves out those that fail the alpha test.
+/// Fragments to shade that are enough to do so: what is known of them should stay in the first-level cache.
+const ENOUGH: usize = 256;
+
+/// The last fragments of a tile as long as they are not shaded, all of one draw. Triangles have few fragments in a tile, so
+/// that only what depends on the triangle is done for each of them; the rest waits until there are many.
+#[derive(Debug)]
+pub(crate) struct Unshaded {
+    /// Number of the draw.
+    draw: u32,
+    /// Number of the first.
+    first: usize,
+    count: usize,
+    /// Texture coordinates.
+    u: Vec<f32>,
+    v: Vec<f32>,
+    /// The square of how many texels a pixel covers.
+    texels_squared: Vec<f32>,
+    /// Colours before the texture, where vertices have some.
+    colors: Vec<[f32; 4]>,
+}
+
+impl Default for Unshaded {
+    fn default() -> Self {
+        const ROOM: usize = ENOUGH + TILE_SAMPLES + LANES;
+        let numbers = || vec![0.0; ROOM];
+        let (u, v, texels_squared) = (numbers(), numbers(), numbers());
+        Self { draw: 0, first: 0, count: 0, u, v, texels_squared, colors: vec![[0.0; 4]; ROOM] }
+    }
+}
+
+impl Unshaded {
+    /// The draw to shade before a fragment of draw `next` is added, if there is one to.
     #[inline(always)]
-    fn shade<S: Simd>(&self, simd: S, first: usize, fragments: &mut Fragments) {
+    pub(crate) fn draw_before(&self, next: Option<u32>) -> Option<u32> {
+        (self.count >= ENOUGH || self.count > 0 && next != Some(self.draw)).then_some(self.draw)
+    }
+
+    /// Adds the fragments of a surface, those from number `first` on. A function of its own, as is [`Self::shade`], for the
+    /// time it takes to compile.
+    #[inline(never)]
+    pub(crate) fn add(
+        &mut self,
+        level: Level,
+        draw_number: u32,
+        surface: &VaryingSurface<'_>,
+        first: usize,
+        fragments: &mut Fragments,
+    ) {
+        if self.count == 0 {
+            (self.draw, self.first) = (draw_number, first);
+        }
+        dispatch!(level, simd => self.add_simd(simd, surface, first, fragments));
+    }
+
+    #[inline(always)]
+    fn add_simd<S: Simd>(&mut self, simd: S, surface: &VaryingSurface<'_>, first: usize, fragments: &mut Fragments) {
+        let (draw, varying) = (surface.draw, &surface.varying);
+        let end = fragments.end();
+        fragments.make_room_after(LANES);
+        let mut to = self.count;
+        for start in (first..end).step_by(LANES) {
+            let samples: i32x8<S> = u32x8::from_slice(simd, fragments.samples_from(start)).bitcast();
+            let x = to_f64((samples & (TILE_PX as i32 - 1)) + surface.left);
+            let y = to_f64((samples >> TILE_PX.ilog2()) + surface.top);
+            let [second, third] = [plane_at(&varying.weights[0], x, y), plane_at(&varying.weights[1], x, y)];
+            let weights = [f32x8::splat(simd, 1.0) - second - third, second, third];
+            let w = f32x8::splat(simd, 1.0) / interpolate(varying.inv_w, weights);
+            if let Some(corners) = varying.vertex_colors {
+                let mut color = [w; 4];
+                for i in 0..4 {
+                    let channel = interpolate([corners[0][i], corners[1][i], corners[2][i]], weights) * w;
+                    color[i] = channel * draw.material.base_color[i];
+                }
+                store_colors(color, self.colors[to..to + LANES].as_flattened_mut());
+            }
+            if let (Some(corners), Some((texture, _))) = (varying.tex_coords, draw.texture) {
+                let u = interpolate(corners.map(|corner| corner.x), weights) * w;
+                let v = interpolate(corners.map(|corner| corner.y), weights) * w;
+                u.store_slice(&mut self.u[to..to + LANES]);
+                v.store_slice(&mut self.v[to..to + LANES]);
+                let texels_squared = surface.texels_squared(simd, texture, corners, [u, v], w);
+                texels_squared.store_slice(&mut self.texels_squared[to..to + LANES]);
+            }
+            to += LANES;
+        }
+        self.count += end - first;
+    }
+
+    /// Shades all, and leaves out those that fail the alpha test.
+    #[inline(never)]
+    pub(crate) fn shade(&mut self, level: Level, draw: &Draw<'_>, fragments: &mut Fragments) {
+        dispatch!(level, simd => self.shade_simd(simd, draw, fragments));
+        self.count = 0;
+    }
+
+    #[inline(always)]
+    fn shade_simd<S: Simd>(&self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
         let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
         let end = fragments.end();
-        let mut kept = first;
-        for start in (first..end).step_by(LANES) {
+        fragments.make_room_after(LANES);
+        fragments.make_room_for_colors(self.count + LANES);
+        let mut kept = self.first;
+        for start in (self.first..end).step_by(LANES) {
             let count = (end - start).min(LANES);
-            fragments.make_room_to_shade(start + LANES);
-            let (samples, depths, lights) = fragments.to_shade(start);
-            let (samples, depths) = (u32x8::from_slice(simd, samples), f32x8::from_slice(simd, depths));
-            let lights = f32x8::from_slice(simd, lights);
-            let (colors, passes) = self.colors(simd, samples.bitcast(), lights, count);
-            let bits = passes.to_bitmask() & ((1 << count) - 1);
-            let passed = bits.count_ones() as usize;
-            let to = fragments.shaded(kept, passed);
-            kept += passed;
-            (lanes + to.first_source).store_slice(to.sources);
-            if self.draw.cutoff.is_none() {
+            let lights = f32x8::from_slice(simd, fragments.lights_from(start));
+            let (colors, passes) = self.lit_colors(simd, draw, start - self.first, lights, count);
+            let Some(passes) = passes else {
+                let to = fragments.shaded(start, count);
+                (lanes + to.first_source).store_slice(to.sources);
                 store_colors(colors, to.colors);
+                kept += count;
                 continue;
-            }
+            };
+            let bits = passes.to_bitmask() & ((1 << count) - 1);
             let passes = mask32x8::from_bitmask(simd, bits);
-            samples.compress(passes).store_slice(to.samples);
-            depths.compress(passes).store_slice(to.depths);
+            let passed = bits.count_ones() as usize;
+            fragments.keep(simd, start, kept, passes);
+            let to = fragments.shaded(kept, passed);
+            (lanes + to.first_source).store_slice(to.sources);
             let [red, green, blue, alpha] = colors;
             let colors = [red.compress(passes), green.compress(passes), blue.compress(passes), alpha.compress(passes)];
             store_colors(colors, to.colors);
+            kept += passed;
         }
         fragments.truncate(kept);
     }
 
-    /// The colours of the first `count` lanes, lit and premultiplied, channel by channel, and which lanes pass the alpha
-    /// test.
+    /// The colours of the vector of fragments from place `at` on, the first `count` of which are there: lit and
+    /// premultiplied, channel by channel; and which of them pass the alpha test, if there is one.
     #[inline(always)]
-    fn colors<S: Simd>(
+    fn lit_colors<S: Simd>(
         &self,
         simd: S,
-        samples: i32x8<S>,
+        draw: &Draw<'_>,
+        at: usize,
         light: f32x8<S>,
         count: usize,
-    ) -> ([f32x8<S>; 4], mask32x8<S>) {
-        let (draw, varying) = (self.draw, &self.varying);
-        let x = to_f64((samples & (TILE_PX as i32 - 1)) + self.left);
-        let y = to_f64((samples >> TILE_PX.ilog2()) + self.top);
-        let [second, third] = [plane_at(&varying.weights[0], x, y), plane_at(&varying.weights[1], x, y)];
-        let weights = [f32x8::splat(simd, 1.0) - second - third, second, third];
-        let w = f32x8::splat(simd, 1.0) / interpolate(varying.inv_w, weights);
+    ) -> ([f32x8<S>; 4], Option<mask32x8<S>>) {
         let base = draw.material.base_color.to_array();
         let mut color = [f32x8::splat(simd, 0.0); 4];
-        for i in 0..4 {
-            color[i] = f32x8::splat(simd, base[i]);
-        }
-        if let Some(corners) = varying.vertex_colors {
+        if draw.mesh.colors().is_some() {
+            color = channels(simd, self.colors[at..at + LANES].as_flattened());
+        } else {
             for i in 0..4 {
-                color[i] *= interpolate([corners[0][i], corners[1][i], corners[2][i]], weights) * w;
+                color[i] = f32x8::splat(simd, base[i]);
             }
         }
-        if let (Some(corners), Some((texture, _))) = (varying.tex_coords, draw.texture) {
-            let u = interpolate(corners.map(|corner| corner.x), weights) * w;
-            let v = interpolate(corners.map(|corner| corner.y), weights) * w;
-            let sampled = self.sample(simd, texture, corners, [u, v], w, count);
+        if let Some((texture, _)) = draw.texture
+            && draw.mesh.tex_coords().is_some()
+        {
+            let sampled = self.sample(simd, texture, at, count);
             for i in 0..4 {
                 color[i] *= sampled[i];
             }
@@ -106,10 +195,7 @@ impl VaryingSurface<'_> {
             let within = color[i].max(0.0).min(GREATEST_COLOR[i]);
             color[i] = is_nan.select(f32x8::splat(simd, base[i]), within);
         }
-        let passes = match draw.cutoff {
-            Some(cutoff) => !color[3].simd_lt(cutoff),
-            None => mask32x8::splat(simd, true),
-        };
+        let passes = draw.cutoff.map(|cutoff| !color[3].simd_lt(cutoff));
         // As `Draw::premultiplied` and `lit`.
         let opacity = f32x8::splat(simd, draw.opacity);
         let alpha = if draw.blends { color[3].min(1.0) * opacity } else { opacity };
@@ -117,54 +203,23 @@ impl VaryingSurface<'_> {
         ([red * alpha * light, green * alpha * light, blue * alpha * light, alpha], passes)
     }
 
-    /// As [`Texture::sample`].
+    /// As [`Texture::sample_scaled`].
     #[inline(always)]
-    fn sample<S: Simd>(
-        &self,
-        simd: S,
-        texture: &Texture,
-        corners: [Vec2; 3],
-        [u, v]: [f32x8<S>; 2],
-        w: f32x8<S>,
-        count: usize,
-    ) -> [f32x8<S>; 4] {
-        // The quotient rule on (u / w) / (1 / w), as in `Varying`.
-        let [second, third] = &self.varying.weights;
-        let derivative = |second: f64, third: f64| {
-            let (second, third) = (second as f32, third as f32);
-            (slope(corners, second, third), slope(self.varying.inv_w, second, third))
-        };
-        let (to_right, to_right_w) = derivative(second.dx, third.dx);
-        let (down, down_w) = derivative(second.dy, third.dy);
-        let base = &texture.levels()[0];
-        let (width, height) = (base.width as f32, base.height as f32);
-        let du_dx = (f32x8::splat(simd, to_right.x) - u * to_right_w) * w;
-        let dv_dx = (f32x8::splat(simd, to_right.y) - v * to_right_w) * w;
-        let du_dy = (f32x8::splat(simd, down.x) - u * down_w) * w;
-        let dv_dy = (f32x8::splat(simd, down.y) - v * down_w) * w;
-        let texels_x = (du_dx * width) * (du_dx * width) + (dv_dx * height) * (dv_dx * height);
-        let texels_y = (du_dy * width) * (du_dy * width) + (dv_dy * height) * (dv_dy * height);
+    fn sample<S: Simd>(&self, simd: S, texture: &Texture, at: usize, count: usize) -> [f32x8<S>; 4] {
+        let range = at..at + LANES;
+        let u = f32x8::from_slice(simd, &self.u[range.clone()]);
+        let v = f32x8::from_slice(simd, &self.v[range.clone()]);
+        let texels_squared = f32x8::from_slice(simd, &self.texels_squared[range]);
         let sampler = texture.sampler();
         let lanes = (1 << count) - 1;
-        let odd = !u.is_finite() | !v.is_finite() | texels_x.is_nan() | texels_y.is_nan();
+        let odd = !u.is_finite() | !v.is_finite() | texels_squared.is_nan();
         let all_linear = sampler.magnify == Filter::Linear
             && sampler.minify == Filter::Linear
             && sampler.mip != Some(Filter::Nearest);
         if !all_linear || odd.to_bitmask() & lanes != 0 {
-            let channels = sample_each(
-                texture,
-                [u.into(), v.into()],
-                [du_dx.into(), dv_dx.into()],
-                [du_dy.into(), dv_dy.into()],
-                count,
-            );
-            let mut color = [u; 4];
-            for i in 0..4 {
-                color[i] = f32x8::load_array(simd, channels[i]);
-            }
-            return color;
+            let colors = sample_each(texture, [u.into(), v.into()], texels_squared.into(), count);
+            return channels(simd, colors.as_flattened());
         }
-        let texels_squared = texels_x.max(texels_y);
         let last = texture.levels().len() as f32 - 1.0;
         let minified = texels_squared.simd_gt(1.0);
         let zero = i32x8::splat(simd, 0);
@@ -183,10 +238,35 @@ impl VaryingSurface<'_> {
     }
 }
 
-/// Shades the fragments of a surface from number `first` on. A function of its own, for the time it takes to compile.
-#[inline(never)]
-pub(crate) fn shade(level: Level, surface: &VaryingSurface<'_>, first: usize, fragments: &mut Fragments) {
-    dispatch!(level, simd => surface.shade(simd, first, fragments));
+impl VaryingSurface<'_> {
+    /// The square of how many texels a pixel covers, as [`Texture::sample`] has it.
+    #[inline(always)]
+    fn texels_squared<S: Simd>(
+        &self,
+        simd: S,
+        texture: &Texture,
+        corners: [Vec2; 3],
+        [u, v]: [f32x8<S>; 2],
+        w: f32x8<S>,
+    ) -> f32x8<S> {
+        // The quotient rule on (u / w) / (1 / w), as in `Varying`.
+        let [second, third] = &self.varying.weights;
+        let derivative = |second: f64, third: f64| {
+            let (second, third) = (second as f32, third as f32);
+            (slope(corners, second, third), slope(self.varying.inv_w, second, third))
+        };
+        let (to_right, to_right_w) = derivative(second.dx, third.dx);
+        let (down, down_w) = derivative(second.dy, third.dy);
+        let base = &texture.levels()[0];
+        let (width, height) = (base.width as f32, base.height as f32);
+        let du_dx = (f32x8::splat(simd, to_right.x) - u * to_right_w) * w;
+        let dv_dx = (f32x8::splat(simd, to_right.y) - v * to_right_w) * w;
+        let du_dy = (f32x8::splat(simd, down.x) - u * down_w) * w;
+        let dv_dy = (f32x8::splat(simd, down.y) - v * down_w) * w;
+        let texels_x = (du_dx * width) * (du_dx * width) + (dv_dx * height) * (dv_dx * height);
+        let texels_y = (du_dy * width) * (du_dy * width) + (dv_dy * height) * (dv_dy * height);
+        texels_x.max_precise(texels_y)
+    }
 }
 
 /// Each lane on its own: where filters are mixed, or coordinates have no value.
@@ -194,20 +274,15 @@ pub(crate) fn shade(level: Level, surface: &VaryingSurface<'_>, first: usize, fr
 #[inline(never)]
 fn sample_each(
     texture: &Texture,
-    uv: [[f32; LANES]; 2],
-    duv_dx: [[f32; LANES]; 2],
-    duv_dy: [[f32; LANES]; 2],
+    [u, v]: [[f32; LANES]; 2],
+    texels_squared: [f32; LANES],
     count: usize,
-) -> [[f32; LANES]; 4] {
-    let mut color = [[0.0; LANES]; 4];
+) -> [[f32; 4]; LANES] {
+    let mut colors = [[0.0; 4]; LANES];
     for lane in 0..count {
-        let at = |pair: &[[f32; LANES]; 2]| Vec2::new(pair[0][lane], pair[1][lane]);
-        let sampled = texture.sample(at(&uv), at(&duv_dx), at(&duv_dy));
-        for (channel, value) in color.iter_mut().zip(sampled.to_array()) {
-            channel[lane] = value;
-        }
+        colors[lane] = texture.sample_scaled(Vec2::new(u[lane], v[lane]), texels_squared[lane]).to_array();
     }
-    color
+    colors
 }
 
 /// From integers below 2^24, which f32 holds exactly.
@@ -299,7 +374,7 @@ impl<'a> Footprints<'a> {
         for lane in 0..count {
             colors[lane] = self.color::<S, OPAQUE>(simd, values, lane).into();
         }
-        channels(simd, &colors)
+        channels(simd, colors.as_flattened())
     }
 
     /// The colours of the first `count`, each so far on the way to that on another level.
@@ -327,7 +402,7 @@ impl<'a> Footprints<'a> {
             let far = far.color::<S, OPAQUE>(simd, values, lane);
             colors[lane] = (near + (far - near) * fraction[lane]).into();
         }
-        channels(simd, &colors)
+        channels(simd, colors.as_flattened())
     }
 }
 
@@ -350,8 +425,8 @@ fn store_colors<S: Simd>([red, green, blue, alpha]: [f32x8<S>; 4], colors: &mut 
 
 /// Colours channel by channel.
 #[inline(always)]
-fn channels<S: Simd>(simd: S, colors: &[[f32; 4]; LANES]) -> [f32x8<S>; 4] {
-    let (low, high) = colors.as_flattened().split_at(LANES * 2);
+fn channels<S: Simd>(simd: S, colors: &[f32]) -> [f32x8<S>; 4] {
+    let (low, high) = colors.split_at(LANES * 2);
     let [red, green, blue, alpha] = f32x4::load_four_interleaved(simd, low);
     let [high_red, high_green, high_blue, high_alpha] = f32x4::load_four_interleaved(simd, high);
     [red.combine(high_red), green.combine(high_green), blue.combine(high_blue), alpha.combine(high_alpha)]
