@@ -79,6 +79,7 @@ pub struct MipLevel {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Texture {
     levels: Vec<MipLevel>,
+    is_opaque: bool,
     sampler: Sampler,
 }
 
@@ -132,12 +133,18 @@ impl Texture {
                 levels.push(smaller);
             }
         }
-        Ok(Self { levels, sampler })
+        let is_opaque = levels.iter().all(|level| level.texels.iter().all(|texel| texel[3] == u8::MAX));
+        Ok(Self { levels, is_opaque, sampler })
     }
 
     /// All levels, the full size first.
     pub fn levels(&self) -> &[MipLevel] {
         &self.levels
+    }
+
+    /// Whether every texel of every level is opaque.
+    pub fn is_opaque(&self) -> bool {
+        self.is_opaque
     }
 
     /// How it is sampled.
@@ -148,11 +155,16 @@ impl Texture {
     /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
     /// changes by `duv_dx` to the right and `duv_dy` downwards.
     pub fn sample(&self, uv: Vec2, duv_dx: Vec2, duv_dy: Vec2) -> Vec4 {
-        let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
         let base = &self.levels[0];
         let size = Vec2::new(base.width as f32, base.height as f32);
         let (dx, dy) = (duv_dx * size, duv_dy * size);
-        let texels_squared = dx.length_squared().max(dy.length_squared());
+        self.sample_scaled(uv, dx.length_squared().max(dy.length_squared()))
+    }
+
+    /// The colour at texture coordinate `uv`, for a pixel that covers so many texels of the full size along its longer
+    /// side, squared.
+    pub fn sample_scaled(&self, uv: Vec2, texels_squared: f32) -> Vec4 {
+        let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
         if texels_squared <= 1.0 || texels_squared.is_nan() {
             return self.sample_level(0, self.sampler.magnify, uv);
         }

@@ -68,11 +68,11 @@ impl TileCapture {
                 let source = sources[number];
                 let color = if source & COLOR == 0 {
                     let (color, light) = (frame.palette[source as usize], lights[number]);
-                    color * Vec4::new(light, light, light, 1.0)
+                    (color * Vec4::new(light, light, light, 1.0)).to_array()
                 } else {
                     colors[(source & !COLOR) as usize]
                 };
-                for (channel, value) in layer.iter_mut().zip(color.to_array()) {
+                for (channel, value) in layer.iter_mut().zip(color) {
                     channel[lane] = value;
                 }
             }

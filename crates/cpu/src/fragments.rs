@@ -1,6 +1,6 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
-use glam::Vec4;
+use fearless_simd::{Simd, SimdBase, f32x8, mask32x8, u32x8};
 
 use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
@@ -19,8 +19,9 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
-    /// Colours of those that were shaded when they were captured.
-    colors: Vec<Vec4>,
+    /// Colours of those that were shaded when they were captured; beyond `color_count` is room.
+    colors: Vec<[f32; 4]>,
+    color_count: usize,
 }
 
 /// One of them.
@@ -43,6 +44,15 @@ pub(crate) struct Room<'a> {
     pub(crate) primitives: &'a mut [u32],
 }
 
+/// Where what a vector of fragments gets when it is shaded can be put.
+pub(crate) struct Shaded<'a> {
+    pub(crate) sources: &'a mut [u32],
+    /// The source of the first; that of each other is one more.
+    pub(crate) first_source: u32,
+    /// Four channels of each.
+    pub(crate) colors: &'a mut [f32],
+}
+
 impl Default for Fragments {
     fn default() -> Self {
         let mut fragments = Self {
@@ -53,6 +63,7 @@ impl Default for Fragments {
             sources: Vec::new(),
             primitives: Vec::new(),
             colors: Vec::new(),
+            color_count: 0,
         };
         fragments.make_room(1);
         fragments
@@ -62,7 +73,7 @@ impl Default for Fragments {
 impl Fragments {
     pub(crate) fn clear(&mut self) {
         self.end = 1;
-        self.colors.clear();
+        self.color_count = 0;
     }
 
     #[inline(always)]
@@ -112,27 +123,54 @@ impl Fragments {
         self.end += 1;
     }
 
-    /// The samples and lights of the vector of fragments that begins at a number, of which some may not be there.
+    /// Room for so many numbers beyond the last, so that whole vectors can be read and written.
     #[inline(always)]
-    pub(crate) fn lanes(&mut self, first: usize) -> (&[u32; SHADED_LANES], &[f32; SHADED_LANES]) {
-        if self.depths.len() < first + SHADED_LANES {
-            self.grow(SHADED_LANES);
-        }
-        (
-            self.samples[first..].first_chunk().unwrap_or(&[0; SHADED_LANES]),
-            self.lights[first..].first_chunk().unwrap_or(&[0.0; SHADED_LANES]),
-        )
+    pub(crate) fn make_room_after(&mut self, count: usize) {
+        self.make_room(count);
     }
 
-    /// Gives the fragment of number `from` a colour that is lit already, and the number `to`, which is not higher.
+    /// Room for so many colours.
     #[inline(always)]
-    pub(crate) fn shaded(&mut self, from: usize, to: usize, color: Vec4) {
-        self.samples[to] = self.samples[from];
-        self.depths[to] = self.depths[from];
-        self.lights[to] = 1.0;
-        self.sources[to] = self.colors.len() as u32 | COLOR;
-        self.primitives[to] = self.primitives[from];
-        self.colors.push(color);
+    pub(crate) fn make_room_for_colors(&mut self, count: usize) {
+        let room = self.color_count + count;
+        if self.colors.len() < room {
+            self.colors.resize(room.next_power_of_two().max(4096), [0.0; 4]);
+        }
+    }
+
+    /// The samples of the vector of fragments that begins at a number, some of which may not be there.
+    #[inline(always)]
+    pub(crate) fn samples_from(&self, first: usize) -> &[u32] {
+        &self.samples[first..first + SHADED_LANES]
+    }
+
+    /// The lights of such a vector.
+    #[inline(always)]
+    pub(crate) fn lights_from(&self, first: usize) -> &[f32] {
+        &self.lights[first..first + SHADED_LANES]
+    }
+
+    /// Of the vector of fragments that begins at number `from`, gives some the numbers from `to` on, which is not above
+    /// `from`. Their colours and sources are still to come.
+    #[inline(always)]
+    pub(crate) fn keep<S: Simd>(&mut self, simd: S, from: usize, to: usize, kept: mask32x8<S>) {
+        let (from, to) = (from..from + SHADED_LANES, to..to + SHADED_LANES);
+        for numbers in [&mut self.samples, &mut self.primitives] {
+            u32x8::from_slice(simd, &numbers[from.clone()]).compress(kept).store_slice(&mut numbers[to.clone()]);
+        }
+        f32x8::from_slice(simd, &self.depths[from]).compress(kept).store_slice(&mut self.depths[to]);
+    }
+
+    /// Where sources and colours of a vector of shaded fragments go, the first `count` of which are there.
+    #[inline(always)]
+    pub(crate) fn shaded(&mut self, first: usize, count: usize) -> Shaded<'_> {
+        let colors = self.color_count..self.color_count + SHADED_LANES;
+        self.color_count += count;
+        Shaded {
+            sources: &mut self.sources[first..first + SHADED_LANES],
+            first_source: colors.start as u32 | COLOR,
+            colors: self.colors[colors].as_flattened_mut(),
+        }
     }
 
     /// The number that the next fragment gets.
@@ -176,8 +214,8 @@ impl Fragments {
 
     /// Brightness and source of each, number 0 among them, dark and without source; and the colours of those shaded.
     #[inline(always)]
-    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32], &[Vec4]) {
-        (&self.lights[..self.end], &self.sources[..self.end], &self.colors)
+    pub(crate) fn lights_and_sources(&self) -> (&[f32], &[u32], &[[f32; 4]]) {
+        (&self.lights[..self.end], &self.sources[..self.end], &self.colors[..self.color_count])
     }
 
     #[inline(always)]
@@ -192,12 +230,12 @@ impl Fragments {
     }
 
     /// The colours of those shaded.
-    pub(crate) fn colors(&self) -> &[Vec4] {
-        &self.colors
+    pub(crate) fn colors(&self) -> &[[f32; 4]] {
+        &self.colors[..self.color_count]
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<Vec4>()
+        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<[f32; 4]>()
     }
 }

@@ -1,21 +1,25 @@
 //! Colours that vary over a triangle, eight fragments at a time.
 //!
-//! Fragments are shaded as soon as a triangle is captured, while what they have in common is at hand: its planes, one
+//! Fragments are shaded as soon as some triangles of a draw are captured, while what they have in common is at hand: one
 //! texture, and texels next to each other. Shading after the sort, when it is known what is hidden, saves little where
 //! surfaces are translucent, and jumps from texture to texture. The operations are those of [`Varying::color_at`], in the
 //! same order.
 
-use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, SimdFloat, SimdInt, SimdMask, SimdNarrow, SimdSplit};
-use fearless_simd::{dispatch, f32x8, f64x8, i32x8};
-use glam::{Vec2, Vec4};
+use fearless_simd::{
+    Bytes, Level, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdInterleaved, SimdMask, SimdNarrow,
+    SimdSplit, SimdWiden,
+};
+use fearless_simd::{dispatch, f32x4, f32x8, f64x8, i32x8, mask32x8, u32x8};
+use glam::Vec2;
 use pellucid_core::Texture;
 use pellucid_core::pixel_grid::Plane;
 use pellucid_core::primitive::Draw;
 use pellucid_core::shading::{GREATEST_COLOR, Varying, slope};
-use pellucid_core::texture::{Filter, TexelValues, Wrap};
+use pellucid_core::texture::{Filter, MipLevel, TexelValues, Wrap};
 
 use crate::bin::TILE_PX;
 use crate::fragments::Fragments;
+use crate::tile::TILE_SAMPLES;
 
 /// Fragments shaded at a time.
 pub(crate) const SHADED_LANES: usize = 8;
@@ -31,62 +35,157 @@ pub(crate) struct VaryingSurface<'a> {
     pub(crate) top: i32,
 }
 
-impl VaryingSurface<'_> {
-    /// Shades the fragments from number `first` on, all of this surface, and leaves out those that fail the alpha test.
+/// Fragments to shade that are enough to do so: what is known of them should stay in the first-level cache.
+const ENOUGH: usize = 256;
+
+/// The last fragments of a tile as long as they are not shaded, all of one draw. Triangles have few fragments in a tile, so
+/// that only what depends on the triangle is done for each of them; the rest waits until there are many.
+#[derive(Debug)]
+pub(crate) struct Unshaded {
+    /// Number of the draw.
+    draw: u32,
+    /// Number of the first.
+    first: usize,
+    count: usize,
+    /// Texture coordinates.
+    u: Vec<f32>,
+    v: Vec<f32>,
+    /// The square of how many texels a pixel covers.
+    texels_squared: Vec<f32>,
+    /// Colours before the texture, where vertices have some.
+    colors: Vec<[f32; 4]>,
+}
+
+impl Default for Unshaded {
+    fn default() -> Self {
+        const ROOM: usize = ENOUGH + TILE_SAMPLES + LANES;
+        let numbers = || vec![0.0; ROOM];
+        let (u, v, texels_squared) = (numbers(), numbers(), numbers());
+        Self { draw: 0, first: 0, count: 0, u, v, texels_squared, colors: vec![[0.0; 4]; ROOM] }
+    }
+}
+
+impl Unshaded {
+    /// The draw to shade before a fragment of draw `next` is added, if there is one to.
     #[inline(always)]
-    fn shade<S: Simd>(&self, simd: S, first: usize, fragments: &mut Fragments) {
+    pub(crate) fn draw_before(&self, next: Option<u32>) -> Option<u32> {
+        (self.count >= ENOUGH || self.count > 0 && next != Some(self.draw)).then_some(self.draw)
+    }
+
+    /// Adds the fragments of a surface, those from number `first` on. A function of its own, as is [`Self::shade`], for the
+    /// time it takes to compile.
+    #[inline(never)]
+    pub(crate) fn add(
+        &mut self,
+        level: Level,
+        draw_number: u32,
+        surface: &VaryingSurface<'_>,
+        first: usize,
+        fragments: &mut Fragments,
+    ) {
+        if self.count == 0 {
+            (self.draw, self.first) = (draw_number, first);
+        }
+        dispatch!(level, simd => self.add_simd(simd, surface, first, fragments));
+    }
+
+    #[inline(always)]
+    fn add_simd<S: Simd>(&mut self, simd: S, surface: &VaryingSurface<'_>, first: usize, fragments: &mut Fragments) {
+        let (draw, varying) = (surface.draw, &surface.varying);
         let end = fragments.end();
-        let mut kept = first;
+        fragments.make_room_after(LANES);
+        let mut to = self.count;
         for start in (first..end).step_by(LANES) {
-            let count = (end - start).min(LANES);
-            let (samples, lights) = fragments.lanes(start);
-            let (samples, lights) = (*samples, *lights);
-            let (color, passes) = self.colors(simd, &samples, &lights, count);
-            for lane in 0..count {
-                if passes >> lane & 1 != 0 {
-                    let color = Vec4::new(color[0][lane], color[1][lane], color[2][lane], color[3][lane]);
-                    fragments.shaded(start + lane, kept, color);
-                    kept += 1;
+            let samples: i32x8<S> = u32x8::from_slice(simd, fragments.samples_from(start)).bitcast();
+            let x = to_f64((samples & (TILE_PX as i32 - 1)) + surface.left);
+            let y = to_f64((samples >> TILE_PX.ilog2()) + surface.top);
+            let [second, third] = [plane_at(&varying.weights[0], x, y), plane_at(&varying.weights[1], x, y)];
+            let weights = [f32x8::splat(simd, 1.0) - second - third, second, third];
+            let w = f32x8::splat(simd, 1.0) / interpolate(varying.inv_w, weights);
+            if let Some(corners) = varying.vertex_colors {
+                let mut color = [w; 4];
+                for i in 0..4 {
+                    let channel = interpolate([corners[0][i], corners[1][i], corners[2][i]], weights) * w;
+                    color[i] = channel * draw.material.base_color[i];
                 }
+                store_colors(color, self.colors[to..to + LANES].as_flattened_mut());
             }
+            if let (Some(corners), Some((texture, _))) = (varying.tex_coords, draw.texture) {
+                let u = interpolate(corners.map(|corner| corner.x), weights) * w;
+                let v = interpolate(corners.map(|corner| corner.y), weights) * w;
+                u.store_slice(&mut self.u[to..to + LANES]);
+                v.store_slice(&mut self.v[to..to + LANES]);
+                let texels_squared = surface.texels_squared(simd, texture, corners, [u, v], w);
+                texels_squared.store_slice(&mut self.texels_squared[to..to + LANES]);
+            }
+            to += LANES;
+        }
+        self.count += end - first;
+    }
+
+    /// Shades all, and leaves out those that fail the alpha test.
+    #[inline(never)]
+    pub(crate) fn shade(&mut self, level: Level, draw: &Draw<'_>, fragments: &mut Fragments) {
+        dispatch!(level, simd => self.shade_simd(simd, draw, fragments));
+        self.count = 0;
+    }
+
+    #[inline(always)]
+    fn shade_simd<S: Simd>(&self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
+        let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
+        let end = fragments.end();
+        fragments.make_room_after(LANES);
+        fragments.make_room_for_colors(self.count + LANES);
+        let mut kept = self.first;
+        for start in (self.first..end).step_by(LANES) {
+            let count = (end - start).min(LANES);
+            let lights = f32x8::from_slice(simd, fragments.lights_from(start));
+            let (colors, passes) = self.lit_colors(simd, draw, start - self.first, lights, count);
+            let Some(passes) = passes else {
+                let to = fragments.shaded(start, count);
+                (lanes + to.first_source).store_slice(to.sources);
+                store_colors(colors, to.colors);
+                kept += count;
+                continue;
+            };
+            let bits = passes.to_bitmask() & ((1 << count) - 1);
+            let passes = mask32x8::from_bitmask(simd, bits);
+            let passed = bits.count_ones() as usize;
+            fragments.keep(simd, start, kept, passes);
+            let to = fragments.shaded(kept, passed);
+            (lanes + to.first_source).store_slice(to.sources);
+            let [red, green, blue, alpha] = colors;
+            let colors = [red.compress(passes), green.compress(passes), blue.compress(passes), alpha.compress(passes)];
+            store_colors(colors, to.colors);
+            kept += passed;
         }
         fragments.truncate(kept);
     }
 
-    /// The colours of the first `count` lanes, lit and premultiplied, channel by channel, and which lanes pass the alpha
-    /// test.
+    /// The colours of the vector of fragments from place `at` on, the first `count` of which are there: lit and
+    /// premultiplied, channel by channel; and which of them pass the alpha test, if there is one.
     #[inline(always)]
-    fn colors<S: Simd>(
+    fn lit_colors<S: Simd>(
         &self,
         simd: S,
-        samples: &[u32; LANES],
-        lights: &[f32; LANES],
+        draw: &Draw<'_>,
+        at: usize,
+        light: f32x8<S>,
         count: usize,
-    ) -> ([[f32; LANES]; 4], u64) {
-        let (draw, varying) = (self.draw, &self.varying);
-        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        for ((x, y), sample) in x.iter_mut().zip(&mut y).zip(samples) {
-            *x = f64::from((sample % TILE_PX) as i32 + self.left);
-            *y = f64::from((sample / TILE_PX) as i32 + self.top);
-        }
-        let (x, y) = (f64x8::load_array(simd, x), f64x8::load_array(simd, y));
-        let [second, third] = [plane_at(&varying.weights[0], x, y), plane_at(&varying.weights[1], x, y)];
-        let weights = [f32x8::splat(simd, 1.0) - second - third, second, third];
-        let w = f32x8::splat(simd, 1.0) / interpolate(varying.inv_w, weights);
+    ) -> ([f32x8<S>; 4], Option<mask32x8<S>>) {
         let base = draw.material.base_color.to_array();
         let mut color = [f32x8::splat(simd, 0.0); 4];
-        for i in 0..4 {
-            color[i] = f32x8::splat(simd, base[i]);
-        }
-        if let Some(corners) = varying.vertex_colors {
+        if draw.mesh.colors().is_some() {
+            color = channels(simd, self.colors[at..at + LANES].as_flattened());
+        } else {
             for i in 0..4 {
-                color[i] *= interpolate([corners[0][i], corners[1][i], corners[2][i]], weights) * w;
+                color[i] = f32x8::splat(simd, base[i]);
             }
         }
-        if let (Some(corners), Some((texture, _))) = (varying.tex_coords, draw.texture) {
-            let u = interpolate(corners.map(|corner| corner.x), weights) * w;
-            let v = interpolate(corners.map(|corner| corner.y), weights) * w;
-            let sampled = self.sample(simd, texture, corners, [u, v], w, count);
+        if let Some((texture, _)) = draw.texture
+            && draw.mesh.tex_coords().is_some()
+        {
+            let sampled = self.sample(simd, texture, at, count);
             for i in 0..4 {
                 color[i] *= sampled[i];
             }
@@ -96,32 +195,60 @@ impl VaryingSurface<'_> {
             let within = color[i].max(0.0).min(GREATEST_COLOR[i]);
             color[i] = is_nan.select(f32x8::splat(simd, base[i]), within);
         }
-        let passes = match draw.cutoff {
-            Some(cutoff) => !color[3].simd_lt(cutoff).to_bitmask(),
-            None => u64::MAX,
-        };
+        let passes = draw.cutoff.map(|cutoff| !color[3].simd_lt(cutoff));
         // As `Draw::premultiplied` and `lit`.
         let opacity = f32x8::splat(simd, draw.opacity);
         let alpha = if draw.blends { color[3].min(1.0) * opacity } else { opacity };
-        let light = f32x8::load_array(simd, *lights);
         let [red, green, blue, _] = color;
-        (
-            [(red * alpha * light).into(), (green * alpha * light).into(), (blue * alpha * light).into(), alpha.into()],
-            passes,
-        )
+        ([red * alpha * light, green * alpha * light, blue * alpha * light, alpha], passes)
     }
 
-    /// As [`Texture::sample`].
+    /// As [`Texture::sample_scaled`].
     #[inline(always)]
-    fn sample<S: Simd>(
+    fn sample<S: Simd>(&self, simd: S, texture: &Texture, at: usize, count: usize) -> [f32x8<S>; 4] {
+        let range = at..at + LANES;
+        let u = f32x8::from_slice(simd, &self.u[range.clone()]);
+        let v = f32x8::from_slice(simd, &self.v[range.clone()]);
+        let texels_squared = f32x8::from_slice(simd, &self.texels_squared[range]);
+        let sampler = texture.sampler();
+        let lanes = (1 << count) - 1;
+        let odd = !u.is_finite() | !v.is_finite() | texels_squared.is_nan();
+        let all_linear = sampler.magnify == Filter::Linear
+            && sampler.minify == Filter::Linear
+            && sampler.mip != Some(Filter::Nearest);
+        if !all_linear || odd.to_bitmask() & lanes != 0 {
+            let colors = sample_each(texture, [u.into(), v.into()], texels_squared.into(), count);
+            return channels(simd, colors.as_flattened());
+        }
+        let last = texture.levels().len() as f32 - 1.0;
+        let minified = texels_squared.simd_gt(1.0);
+        let zero = i32x8::splat(simd, 0);
+        if sampler.mip.is_none() || minified.to_bitmask() & lanes == 0 {
+            return Footprints::new(simd, texture, zero, [u, v]).colors(simd, count);
+        }
+        let level = minified.select((log2(simd, texels_squared) * 0.5).min(last), zero.to_float());
+        let whole: i32x8<S> = level.to_int();
+        let fraction = level - whole.to_float::<f32x8<S>>();
+        let near = Footprints::new(simd, texture, whole, [u, v]);
+        if fraction.simd_gt(0.0).to_bitmask() & lanes == 0 {
+            return near.colors(simd, count);
+        }
+        let far = Footprints::new(simd, texture, (whole + 1).min(last as i32), [u, v]);
+        near.colors_between(simd, &far, fraction.into(), count)
+    }
+}
+
+impl VaryingSurface<'_> {
+    /// The square of how many texels a pixel covers, as [`Texture::sample`] has it.
+    #[inline(always)]
+    fn texels_squared<S: Simd>(
         &self,
         simd: S,
         texture: &Texture,
         corners: [Vec2; 3],
         [u, v]: [f32x8<S>; 2],
         w: f32x8<S>,
-        count: usize,
-    ) -> [f32x8<S>; 4] {
+    ) -> f32x8<S> {
         // The quotient rule on (u / w) / (1 / w), as in `Varying`.
         let [second, third] = &self.varying.weights;
         let derivative = |second: f64, third: f64| {
@@ -138,53 +265,8 @@ impl VaryingSurface<'_> {
         let dv_dy = (f32x8::splat(simd, down.y) - v * down_w) * w;
         let texels_x = (du_dx * width) * (du_dx * width) + (dv_dx * height) * (dv_dx * height);
         let texels_y = (du_dy * width) * (du_dy * width) + (dv_dy * height) * (dv_dy * height);
-        let sampler = texture.sampler();
-        let lanes = (1 << count) - 1;
-        let odd = !u.is_finite() | !v.is_finite() | texels_x.is_nan() | texels_y.is_nan();
-        let all_linear = sampler.magnify == Filter::Linear
-            && sampler.minify == Filter::Linear
-            && sampler.mip != Some(Filter::Nearest);
-        if !all_linear || odd.to_bitmask() & lanes != 0 {
-            let channels = sample_each(
-                texture,
-                [u.into(), v.into()],
-                [du_dx.into(), dv_dx.into()],
-                [du_dy.into(), dv_dy.into()],
-                count,
-            );
-            let mut color = [u; 4];
-            for i in 0..4 {
-                color[i] = f32x8::load_array(simd, channels[i]);
-            }
-            return color;
-        }
-        let texels_squared = texels_x.max(texels_y);
-        let last = texture.levels().len() as f32 - 1.0;
-        let minified = texels_squared.simd_gt(1.0);
-        if sampler.mip.is_none() || minified.to_bitmask() & lanes == 0 {
-            return sample_level(simd, texture, [0; LANES], [u, v], count);
-        }
-        let zero = f32x8::splat(simd, 0.0);
-        let level = minified.select((log2(simd, texels_squared) * 0.5).min(last), zero);
-        let whole: i32x8<S> = level.to_int();
-        let fraction = level - whole.to_float::<f32x8<S>>();
-        let near = sample_level(simd, texture, whole.into(), [u, v], count);
-        if fraction.simd_gt(0.0).to_bitmask() & lanes == 0 {
-            return near;
-        }
-        let far = sample_level(simd, texture, (whole + 1).min(last as i32).into(), [u, v], count);
-        let mut between = near;
-        for i in 0..4 {
-            between[i] += (far[i] - near[i]) * fraction;
-        }
-        between
+        texels_x.max_precise(texels_y)
     }
-}
-
-/// Shades the fragments of a surface from number `first` on. A function of its own, for the time it takes to compile.
-#[inline(never)]
-pub(crate) fn shade(level: Level, surface: &VaryingSurface<'_>, first: usize, fragments: &mut Fragments) {
-    dispatch!(level, simd => surface.shade(simd, first, fragments));
 }
 
 /// Each lane on its own: where filters are mixed, or coordinates have no value.
@@ -192,20 +274,22 @@ pub(crate) fn shade(level: Level, surface: &VaryingSurface<'_>, first: usize, fr
 #[inline(never)]
 fn sample_each(
     texture: &Texture,
-    uv: [[f32; LANES]; 2],
-    duv_dx: [[f32; LANES]; 2],
-    duv_dy: [[f32; LANES]; 2],
+    [u, v]: [[f32; LANES]; 2],
+    texels_squared: [f32; LANES],
     count: usize,
-) -> [[f32; LANES]; 4] {
-    let mut color = [[0.0; LANES]; 4];
+) -> [[f32; 4]; LANES] {
+    let mut colors = [[0.0; 4]; LANES];
     for lane in 0..count {
-        let at = |pair: &[[f32; LANES]; 2]| Vec2::new(pair[0][lane], pair[1][lane]);
-        let sampled = texture.sample(at(&uv), at(&duv_dx), at(&duv_dy));
-        for (channel, value) in color.iter_mut().zip(sampled.to_array()) {
-            channel[lane] = value;
-        }
+        colors[lane] = texture.sample_scaled(Vec2::new(u[lane], v[lane]), texels_squared[lane]).to_array();
     }
-    color
+    colors
+}
+
+/// From integers below 2^24, which f32 holds exactly.
+#[inline(always)]
+fn to_f64<S: Simd>(values: i32x8<S>) -> f64x8<S> {
+    let (low, high) = values.to_float::<f32x8<S>>().widen();
+    low.combine(high)
 }
 
 /// A plane rounded to f32, as [`Plane::at`].
@@ -229,51 +313,123 @@ fn log2<S: Simd>(simd: S, value: f32x8<S>) -> f32x8<S> {
     exponent.to_float::<f32x8<S>>() + (mantissa - 1.0)
 }
 
-/// The four texels around each coordinate on its own level, weighted by distance.
-#[inline(always)]
-fn sample_level<S: Simd>(
-    simd: S,
-    texture: &Texture,
+/// The four texels around each of eight coordinates, each on a level of its own.
+struct Footprints<'a> {
+    levels: &'a [MipLevel],
+    /// Whether no texel is translucent.
+    is_opaque: bool,
     level: [i32; LANES],
-    [u, v]: [f32x8<S>; 2],
-    count: usize,
-) -> [f32x8<S>; 4] {
-    let levels = texture.levels();
-    let sampler = texture.sampler();
-    let (mut width, mut height) = ([1; LANES], [1; LANES]);
-    for lane in 0..count {
-        let level = &levels[level[lane] as usize];
-        (width[lane], height[lane]) = (level.width as i32, level.height as i32);
-    }
-    let (width, height) = (i32x8::load_array(simd, width), i32x8::load_array(simd, height));
-    let (left, right, across) = texel_pair(simd, u, width, sampler.wrap_u);
-    let (top, bottom, down) = texel_pair(simd, v, height, sampler.wrap_v);
-    let (top, bottom) = (top * width, bottom * width);
-    let places: [[i32; LANES]; 4] =
-        [(top + left).into(), (top + right).into(), (bottom + left).into(), (bottom + right).into()];
-    let values = TexelValues::get();
-    let mut channels = [[[0.0; LANES]; 4]; 4];
-    for lane in 0..count {
-        let texels: &[[u8; 4]] = &levels[level[lane] as usize].texels;
-        for (corner, places) in channels.iter_mut().zip(&places) {
-            let [red, green, blue, alpha] = texels[places[lane] as usize];
-            corner[0][lane] = values.linear[red as usize];
-            corner[1][lane] = values.linear[green as usize];
-            corner[2][lane] = values.linear[blue as usize];
-            corner[3][lane] = values.alpha[alpha as usize];
+    /// Places in the level: top left, top right, bottom left, bottom right.
+    places: [[i32; LANES]; 4],
+    /// The shares of the texels to the right and below.
+    across: [f32; LANES],
+    down: [f32; LANES],
+}
+
+impl<'a> Footprints<'a> {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, texture: &'a Texture, level: i32x8<S>, [u, v]: [f32x8<S>; 2]) -> Self {
+        let levels = texture.levels();
+        let sampler = texture.sampler();
+        // Each level is half as large as the one before.
+        let width = (i32x8::splat(simd, levels[0].width as i32) >> level).max(1);
+        let height = (i32x8::splat(simd, levels[0].height as i32) >> level).max(1);
+        let (left, right, across) = texel_pair(simd, u, width, sampler.wrap_u);
+        let (top, bottom, down) = texel_pair(simd, v, height, sampler.wrap_v);
+        let (top, bottom) = (top * width, bottom * width);
+        Self {
+            levels,
+            is_opaque: texture.is_opaque(),
+            level: level.into(),
+            places: [(top + left).into(), (top + right).into(), (bottom + left).into(), (bottom + right).into()],
+            across: across.into(),
+            down: down.into(),
         }
     }
-    let mut color = [f32x8::splat(simd, 0.0); 4];
-    for i in 0..4 {
-        let top_left = f32x8::load_array(simd, channels[0][i]);
-        let top_right = f32x8::load_array(simd, channels[1][i]);
-        let bottom_left = f32x8::load_array(simd, channels[2][i]);
-        let bottom_right = f32x8::load_array(simd, channels[3][i]);
-        let above = top_left + (top_right - top_left) * across;
-        let below = bottom_left + (bottom_right - bottom_left) * across;
-        color[i] = above + (below - above) * down;
+
+    /// The colour of one: its texels, weighted by distance. All channels together, so that what comes from the table of
+    /// values stays in registers.
+    #[inline(always)]
+    fn color<S: Simd, const OPAQUE: bool>(&self, simd: S, values: &TexelValues, lane: usize) -> f32x4<S> {
+        let texels: &[[u8; 4]] = &self.levels[self.level[lane] as usize].texels;
+        let top_left = texel::<S, OPAQUE>(simd, values, texels[self.places[0][lane] as usize]);
+        let top_right = texel::<S, OPAQUE>(simd, values, texels[self.places[1][lane] as usize]);
+        let bottom_left = texel::<S, OPAQUE>(simd, values, texels[self.places[2][lane] as usize]);
+        let bottom_right = texel::<S, OPAQUE>(simd, values, texels[self.places[3][lane] as usize]);
+        let above = top_left + (top_right - top_left) * self.across[lane];
+        let below = bottom_left + (bottom_right - bottom_left) * self.across[lane];
+        above + (below - above) * self.down[lane]
     }
-    color
+
+    /// The colours of the first `count`, channel by channel.
+    #[inline(always)]
+    fn colors<S: Simd>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
+        if self.is_opaque { self.colors_of::<S, true>(simd, count) } else { self.colors_of::<S, false>(simd, count) }
+    }
+
+    #[inline(always)]
+    fn colors_of<S: Simd, const OPAQUE: bool>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
+        let values = TexelValues::get();
+        let mut colors = [[0.0; 4]; LANES];
+        for lane in 0..count {
+            colors[lane] = self.color::<S, OPAQUE>(simd, values, lane).into();
+        }
+        channels(simd, colors.as_flattened())
+    }
+
+    /// The colours of the first `count`, each so far on the way to that on another level.
+    #[inline(always)]
+    fn colors_between<S: Simd>(&self, simd: S, far: &Self, fraction: [f32; LANES], count: usize) -> [f32x8<S>; 4] {
+        if self.is_opaque {
+            self.colors_between_of::<S, true>(simd, far, fraction, count)
+        } else {
+            self.colors_between_of::<S, false>(simd, far, fraction, count)
+        }
+    }
+
+    #[inline(always)]
+    fn colors_between_of<S: Simd, const OPAQUE: bool>(
+        &self,
+        simd: S,
+        far: &Self,
+        fraction: [f32; LANES],
+        count: usize,
+    ) -> [f32x8<S>; 4] {
+        let values = TexelValues::get();
+        let mut colors = [[0.0; 4]; LANES];
+        for lane in 0..count {
+            let near = self.color::<S, OPAQUE>(simd, values, lane);
+            let far = far.color::<S, OPAQUE>(simd, values, lane);
+            colors[lane] = (near + (far - near) * fraction[lane]).into();
+        }
+        channels(simd, colors.as_flattened())
+    }
+}
+
+/// Linear light and alpha of a texel.
+#[inline(always)]
+fn texel<S: Simd, const OPAQUE: bool>(simd: S, values: &TexelValues, texel: [u8; 4]) -> f32x4<S> {
+    let [red, green, blue, alpha] = u32::from_le_bytes(texel).to_le_bytes().map(usize::from);
+    let alpha = if OPAQUE { 1.0 } else { values.alpha[alpha] };
+    f32x4::load_array(simd, [values.linear[red], values.linear[green], values.linear[blue], alpha])
+}
+
+/// Colours from channels.
+#[inline(always)]
+fn store_colors<S: Simd>([red, green, blue, alpha]: [f32x8<S>; 4], colors: &mut [f32]) {
+    let (red, green, blue, alpha) = (red.split(), green.split(), blue.split(), alpha.split());
+    let (low, high) = colors.split_at_mut(LANES * 2);
+    f32x4::store_four_interleaved([red.0, green.0, blue.0, alpha.0], low);
+    f32x4::store_four_interleaved([red.1, green.1, blue.1, alpha.1], high);
+}
+
+/// Colours channel by channel.
+#[inline(always)]
+fn channels<S: Simd>(simd: S, colors: &[f32]) -> [f32x8<S>; 4] {
+    let (low, high) = colors.split_at(LANES * 2);
+    let [red, green, blue, alpha] = f32x4::load_four_interleaved(simd, low);
+    let [high_red, high_green, high_blue, high_alpha] = f32x4::load_four_interleaved(simd, high);
+    [red.combine(high_red), green.combine(high_green), blue.combine(high_blue), alpha.combine(high_alpha)]
 }
 
 /// Along one axis of a level: the texels before and behind a coordinate, and the share of the latter.

@@ -340,9 +340,17 @@ impl SmallFragments {
         }
         let (places, fragments) = (&new.places[..count], &new.fragments[..count]);
         self.starts.resize(grid.tile_count() + 1, 0);
+        let (mut last_tile, mut last_count) = (0, 0);
         for place in places {
-            self.starts[(place >> SAMPLE_BITS) as usize + 1] += 1;
+            // Mostly the tile of the one before: its count waits in a register.
+            let tile = (place >> SAMPLE_BITS) as usize;
+            if tile != last_tile {
+                self.starts[last_tile + 1] += std::mem::take(&mut last_count);
+                last_tile = tile;
+            }
+            last_count += 1;
         }
+        self.starts[last_tile + 1] += last_count;
         for i in 1..self.starts.len() {
             self.starts[i] += self.starts[i - 1];
         }
@@ -352,12 +360,18 @@ impl SmallFragments {
             self.fragments.resize(count + count / 16, SmallFragment::default());
         }
         // Each start moves to the next one's place while its fragments are put down ...
+        let (mut last_tile, mut start) = (0, 0);
         for (&place, &fragment) in places.iter().zip(fragments) {
-            let start = &mut self.starts[(place >> SAMPLE_BITS) as usize];
-            self.samples[*start as usize] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
-            self.fragments[*start as usize] = fragment;
-            *start += 1;
+            let tile = (place >> SAMPLE_BITS) as usize;
+            if tile != last_tile {
+                self.starts[last_tile] = start as u32;
+                (last_tile, start) = (tile, self.starts[tile] as usize);
+            }
+            self.samples[start] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
+            self.fragments[start] = fragment;
+            start += 1;
         }
+        self.starts[last_tile] = start as u32;
         // ... and back.
         self.starts.copy_within(0..grid.tile_count(), 1);
         self.starts[0] = 0;

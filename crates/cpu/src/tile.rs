@@ -14,7 +14,7 @@ use crate::fragments::{COLOR, Fragments};
 use crate::order::Order;
 use crate::raster::{Coverage, Depths, FoldState, RowFragments, cover};
 use crate::setup::{Chunk, Record};
-use crate::shade::{VaryingSurface, shade};
+use crate::shade::{Unshaded, VaryingSurface};
 use crate::small::SmallFragment;
 use crate::surfaces::Surfaces;
 
@@ -40,6 +40,7 @@ pub(crate) struct TileCapture {
     opaque_depths: Vec<f32>,
     pub(crate) has_opaque: bool,
     pub(crate) fragments: Fragments,
+    unshaded: Unshaded,
     pub(crate) order: Order,
 }
 
@@ -94,6 +95,7 @@ impl Default for TileCapture {
             opaque_depths: vec![0.0; TILE_SAMPLES + TILE_SLACK],
             has_opaque: false,
             fragments: Fragments::default(),
+            unshaded: Unshaded::default(),
             order: Order::default(),
         }
     }
@@ -210,12 +212,13 @@ impl TileCapture {
                 let record = chunk.record(record);
                 let primitive = frame.draws[record.draw as usize].first_primitive + record.triangle;
                 let before = small.iter().take_while(|fragment| fragment.primitive < primitive).count();
-                self.add_small(&small[..before], &samples[..before], band);
+                self.add_small(&small[..before], &samples[..before], band, frame);
                 (small, samples) = (&small[before..], &samples[before..]);
                 self.add_transparent(simd, chunk, record, frame, &mut coverage);
             }
-            self.add_small(small, samples, band);
+            self.add_small(small, samples, band, frame);
         }
+        self.shade_before(None, frame);
     }
 
     #[inline(always)]
@@ -274,7 +277,11 @@ impl TileCapture {
 
     /// Adds fragments of small triangles that lie in a band, unless they lie behind an opaque surface.
     #[inline(always)]
-    fn add_small(&mut self, small: &[SmallFragment], samples: &[u16], band: Band) {
+    fn add_small(&mut self, small: &[SmallFragment], samples: &[u16], band: Band, frame: FrameParts<'_>) {
+        if small.is_empty() {
+            return;
+        }
+        self.shade_before(None, frame);
         if !self.has_opaque && band.is_whole_tile() {
             self.fragments.extend(small, samples);
             return;
@@ -312,6 +319,7 @@ impl TileCapture {
         if record.fold != Fold::None {
             self.fold.apply(record.fold, primitive, coverage);
         }
+        self.shade_before(Some(record.draw), frame);
         let weights = triangle.weight_planes();
         let depths = Depths::new(&triangle, weights, self.rect);
         let normal = NormalPlane::new(&record.normals, weights);
@@ -331,7 +339,15 @@ impl TileCapture {
                 left: self.rect.left - anchor_x,
                 top: self.rect.top - anchor_y,
             };
-            shade(frame.level, &surface, first, &mut self.fragments);
+            self.unshaded.add(frame.level, record.draw, &surface, first, &mut self.fragments);
+        }
+    }
+
+    /// Shades fragments that wait for it, unless those of draw `next` can join them.
+    #[inline(always)]
+    fn shade_before(&mut self, next: Option<u32>, frame: FrameParts<'_>) {
+        if let Some(draw) = self.unshaded.draw_before(next) {
+            self.unshaded.shade(frame.level, &frame.draws[draw as usize], &mut self.fragments);
         }
     }
 
@@ -342,7 +358,7 @@ impl TileCapture {
             return self.surfaces.color(source & !SURFACE, x, y, frame.draws);
         }
         if source & COLOR != 0 {
-            return self.fragments.colors().get((source & !COLOR) as usize).copied();
+            return self.fragments.colors().get((source & !COLOR) as usize).copied().map(Vec4::from_array);
         }
         Some(lit(frame.palette[source as usize], light))
     }
