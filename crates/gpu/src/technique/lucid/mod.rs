@@ -15,8 +15,8 @@
 //!
 //! What differs from the paper, and why:
 //!
-//! - Small triangles, which most are, go to blocks at set-up, not to bins and from there to blocks: one of few samples would
-//!   be read and rasterized twice to find one block.
+//! - Small triangles, which most are, go to blocks at set-up, up to 4 x 4 of them, not to bins and from there to blocks: one of
+//!   few samples would be read and rasterized twice to find one block.
 //! - Stages are passes over parts, blocks and pixels rather than workgroups that keep a bin in their memory: lists are as long
 //!   as counted, there is no limit to triangles in a block, and neither barriers nor memory of workgroups, which are what is
 //!   dear on llvmpipe. The price is that fragments are stored before they are blended, 16 bytes each, and that the threshold of
