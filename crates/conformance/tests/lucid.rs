@@ -249,7 +249,7 @@ fn real_scenes_agree_with_the_oracle_at_any_filter() {
             continue;
         }
         let scene = pellucid::load_file(&file).unwrap().scene;
-        let view = View::of(&scene).size(96, 64).opacity(0.5);
+        let view = View::of(&scene).size(40, 30).opacity(0.5);
         scenes.push((path, prepared(scene, view)));
     }
     let mut failures = Vec::new();

@@ -1,7 +1,9 @@
 //! Tables of groups of four words, in textures: what shaders read most, as llvmpipe fetches texels whole, and words of buffers
 //! lane by lane. Twin: `shaders/shared/table.wesl`.
 
-use wgpu::{Extent3d, TextureFormat, TextureUsages};
+use std::ops::Range;
+
+use wgpu::{Extent3d, Origin3d, TextureFormat, TextureUsages};
 
 use crate::{Context, GpuError};
 
@@ -95,38 +97,83 @@ pub(crate) fn write(gpu: &Context, table: &wgpu::Texture, groups: impl IntoItera
 
 /// Writes groups from number `first` on.
 pub(crate) fn write_from(gpu: &Context, table: &wgpu::Texture, first: u64, groups: &[Group]) {
-    let (row, column) = (first / WIDTH, first % WIDTH);
-    let begun = if column > 0 { groups.len().min((WIDTH - column) as usize) } else { 0 };
-    let (begun, rest) = groups.split_at(begun);
-    let (rows, left) = rest.split_at(rest.len() - rest.len() % WIDTH as usize);
-    let next_row = row + u64::from(!begun.is_empty());
-    write_rows(gpu, table, [column, row], begun);
-    for (part, rows) in (0..).zip(rows.chunks(WRITTEN)) {
-        write_rows(gpu, table, [0, next_row + part * (WRITTEN as u64 / WIDTH)], rows);
+    for Piece { groups: range, origin, extent } in pieces(first, groups.len() as u64) {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo { texture: table, mip_level: 0, origin, aspect: wgpu::TextureAspect::All },
+            bytemuck::cast_slice(&groups[range]),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some((u64::from(extent.width) * GROUP_BYTES) as u32),
+                rows_per_image: None,
+            },
+            extent,
+        );
     }
-    write_rows(gpu, table, [0, next_row + rows.len() as u64 / WIDTH], left);
 }
 
-/// Writes a piece of a row, or whole rows of one layer.
-fn write_rows(gpu: &Context, table: &wgpu::Texture, [column, row]: [u64; 2], groups: &[Group]) {
-    if groups.is_empty() {
-        return;
+/// Groups that are a rectangle of a table: a piece of a row, or whole rows of one layer.
+#[derive(Debug)]
+struct Piece {
+    groups: Range<usize>,
+    origin: Origin3d,
+    extent: Extent3d,
+}
+
+/// So many groups from number `first` on: to the end of its row, whole rows layer by layer, and what is left.
+fn pieces(first: u64, count: u64) -> impl Iterator<Item = Piece> {
+    let end = first + count;
+    let mut next = first;
+    std::iter::from_fn(move || {
+        let (left, row) = (end - next, next / WIDTH);
+        let (column, rows_of_layer) = (next % WIDTH, HEIGHT - row % HEIGHT);
+        let (width, height) = match (column, left / WIDTH) {
+            (0, rows @ 1..) => (WIDTH, rows.min(rows_of_layer)),
+            _ => (left.min(WIDTH - column), 1),
+        };
+        let start = (next - first) as usize;
+        next += width * height;
+        (left > 0).then(|| Piece {
+            groups: start..start + (width * height) as usize,
+            origin: Origin3d { x: column as u32, y: (row % HEIGHT) as u32, z: (row / HEIGHT) as u32 },
+            extent: Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: 1 },
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a shader looks for a group, as `texel_of` in `shaders/shared/table.wesl`.
+    fn texel_of(number: u64) -> [u64; 3] {
+        [number & 1023, (number >> 10) & 8191, number >> 23]
     }
-    let width = groups.len().min(WIDTH as usize);
-    let height = groups.len() / width;
-    gpu.queue.write_texture(
-        wgpu::TexelCopyTextureInfo {
-            texture: table,
-            mip_level: 0,
-            origin: wgpu::Origin3d { x: column as u32, y: (row % HEIGHT) as u32, z: (row / HEIGHT) as u32 },
-            aspect: wgpu::TextureAspect::All,
-        },
-        bytemuck::cast_slice(groups),
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some((width as u64 * GROUP_BYTES) as u32),
-            rows_per_image: None,
-        },
-        Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: 1 },
-    );
+
+    #[test]
+    fn every_group_is_written_where_shaders_look_for_it() {
+        let layer = WIDTH * HEIGHT;
+        for (first, count) in
+            [(0, 0), (0, 1), (5, 1000), (5, 1019), (5, 1020), (1000, 5000), (layer - 1500, 4000), (layer, 2048)]
+        {
+            let mut next = 0;
+            for Piece { groups, origin, extent } in pieces(first, count) {
+                assert_eq!((groups.start, extent.depth_or_array_layers), (next, 1));
+                next = groups.end;
+                let texels = (0..extent.height).flat_map(|y| (0..extent.width).map(move |x| (x, y)));
+                let places = texels.map(|(x, y)| [origin.x + x, origin.y + y, origin.z].map(u64::from));
+                assert!(places.eq(groups.map(|group| texel_of(first + group as u64))), "{first}, {count}");
+            }
+            assert_eq!(next as u64, count);
+        }
+    }
+
+    #[test]
+    fn tables_have_room_for_what_they_are_made_for() {
+        for count in [0, 1, 1024, 1025, WIDTH * HEIGHT, WIDTH * HEIGHT + 1] {
+            let [x, y, z] = texel_of(count.max(1) - 1);
+            let Extent3d { width, height, depth_or_array_layers } = size(count);
+            assert!(x < width.into() && y < height.into() && z < depth_or_array_layers.into(), "{count}");
+            assert!(bytes(GROUPS, count) >= count * 16 && bytes(PAIRS, count) * 2 == bytes(GROUPS, count));
+        }
+    }
 }
