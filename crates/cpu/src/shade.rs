@@ -371,8 +371,8 @@ impl<'a> Footprints<'a> {
     fn colors_of<S: Simd, const OPAQUE: bool>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
         let values = TexelValues::get();
         let mut colors = [[0.0; 4]; LANES];
-        for lane in 0..count {
-            colors[lane] = self.color::<S, OPAQUE>(simd, values, lane).into();
+        for (lane, color) in colors.iter_mut().enumerate().take(count) {
+            *color = self.color::<S, OPAQUE>(simd, values, lane).into();
         }
         channels(simd, colors.as_flattened())
     }
