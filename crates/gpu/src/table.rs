@@ -37,11 +37,12 @@ pub(crate) fn descriptor(label: &str, format: TextureFormat, count: u64) -> wgpu
     }
 }
 
+/// Less than a row is as wide as it has to be.
 fn size(count: u64) -> Extent3d {
-    let rows = count.div_ceil(WIDTH).max(1);
-    let layers = rows.div_ceil(HEIGHT);
-    let height = if layers > 1 { HEIGHT } else { rows };
-    Extent3d { width: WIDTH as u32, height: height as u32, depth_or_array_layers: layers as u32 }
+    let count = count.max(1);
+    let rows = count.div_ceil(WIDTH);
+    let (width, height) = (count.min(WIDTH), rows.min(HEIGHT));
+    Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: rows.div_ceil(HEIGHT) as u32 }
 }
 
 /// Bytes of a table with room for so many.
@@ -169,7 +170,7 @@ mod tests {
 
     #[test]
     fn tables_have_room_for_what_they_are_made_for() {
-        for count in [0, 1, 1024, 1025, WIDTH * HEIGHT, WIDTH * HEIGHT + 1] {
+        for count in [0, 1, 700, 1024, 1025, WIDTH * HEIGHT, WIDTH * HEIGHT + 1] {
             let [x, y, z] = texel_of(count.max(1) - 1);
             let Extent3d { width, height, depth_or_array_layers } = size(count);
             assert!(x < width.into() && y < height.into() && z < depth_or_array_layers.into(), "{count}");
