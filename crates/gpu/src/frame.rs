@@ -292,16 +292,7 @@ impl<'a> Frame<'a> {
 
     /// Zeroes the first bytes of a buffer as a step of its own.
     pub(crate) fn zero(&mut self, step: &'static str, buffer: &wgpu::Buffer, bytes: u64) -> Result<(), GpuError> {
-        self.transfer(step, |encoder| encoder.clear_buffer(buffer, 0, Some(bytes)))
-    }
-
-    /// Records clears and copies as a step of their own.
-    pub(crate) fn transfer(
-        &mut self,
-        step: &'static str,
-        record: impl FnOnce(&mut wgpu::CommandEncoder),
-    ) -> Result<(), GpuError> {
-        // They carry no timestamps: empty passes before and after do.
+        // Clears carry no timestamps: empty passes before and after do.
         let stamps = self.begin_step(step)?;
         let empty_pass = |encoder: &mut wgpu::CommandEncoder, begin: bool| {
             let Some((query_set, first, second)) = &stamps else { return };
@@ -313,7 +304,7 @@ impl<'a> Frame<'a> {
             drop(encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(step), timestamp_writes }));
         };
         empty_pass(self.encoder(), true);
-        record(self.encoder());
+        self.encoder().clear_buffer(buffer, 0, Some(bytes));
         empty_pass(self.encoder(), false);
         Ok(())
     }
