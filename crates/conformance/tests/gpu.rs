@@ -5,7 +5,7 @@ mod common;
 use pellucid::core::oracle;
 use pellucid::gpu::{GpuError, GpuRenderer};
 use pellucid::{Error, Renderer, Resolve, Technique, View};
-use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
+use pellucid_conformance::suite::{Candidate, Check, Prepared, prepare_all};
 
 use common::gpu;
 
@@ -18,27 +18,27 @@ fn techniques() -> impl Iterator<Item = Technique> {
 /// together tells why.
 #[test]
 fn exact_techniques_agree_with_the_oracle() {
-    let mut candidates = Vec::new();
-    for floor in [false, true] {
-        for technique in techniques() {
-            let Some(gpu) = gpu(floor) else { return };
-            let what = format!("{technique}{}", if floor { " on the floor" } else { "" });
-            candidates.push((what, technique, Candidate::new(technique, Renderer::new().gpu(gpu))));
-        }
-    }
+    let cases = prepare_all().unwrap();
     let mut failures = Vec::new();
-    for case in CASES {
-        let prepared = case.prepare().unwrap();
-        for (what, technique, candidate) in &candidates {
-            for check in Check::ALL {
-                // A thousand passes over a thousand planes for every picture: fewer of them.
-                let is_long = *technique == Technique::Peel && case.source == "@planes:n=1000";
-                if is_long && !matches!(check, Check::Layers | Check::Picture(Resolve::Gelly)) {
-                    continue;
-                }
-                let comparison = prepared.run(check, candidate).unwrap_or_else(|error| panic!("{case:?}: {error}"));
-                if !comparison.passes() {
-                    failures.push(format!("{what}, {case:?}, {check}: {comparison:?}"));
+    for floor in [false, true] {
+        // One device for all techniques, as most of the time goes into compiling shaders.
+        let Some(device) = gpu(floor) else { return };
+        let mut candidate = Candidate::new(Technique::Linear, Renderer::new().gpu(device));
+        for technique in techniques() {
+            candidate = candidate.technique(technique);
+            for (case, prepared) in &cases {
+                for check in Check::ALL {
+                    // A thousand passes over a thousand planes for every picture: fewer of them.
+                    let is_long = technique == Technique::Peel && case.source == "@planes:n=1000";
+                    if is_long && !matches!(check, Check::Layers | Check::Picture(Resolve::Gelly)) {
+                        continue;
+                    }
+                    let comparison =
+                        prepared.run(check, &candidate).unwrap_or_else(|error| panic!("{case:?}: {error}"));
+                    if !comparison.passes() {
+                        let on = if floor { " on the floor" } else { "" };
+                        failures.push(format!("{technique}{on}, {case:?}, {check}: {comparison:?}"));
+                    }
                 }
             }
         }

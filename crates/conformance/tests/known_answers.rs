@@ -55,6 +55,41 @@ fn n_planes_of_alpha_a_leave_the_nth_power_of_the_background() {
     }
 }
 
+/// Blending may end where nothing behind changes a bit, and no earlier: behind so many layers that hardly anything gets
+/// through stands one that has what those lack, or is much brighter, and then more that change nothing.
+#[test]
+fn what_hardly_gets_through_is_seen_where_nothing_outshines_it() {
+    let grey = |value: f32, alpha: f32| Vec4::new(value, value, value, alpha);
+    let green = Vec4::new(0.0, 1.0, 0.0, 0.5);
+    for (layers, front, behind, ends_early) in [
+        (40, green, Vec4::new(1.0, 0.0, 0.0, 1.0), false),
+        (25, grey(0.001, 0.5), grey(1.0, 1.0), false),
+        (30, grey(1.0, 0.5), grey(60_000.0, 1.0), false),
+        (56, grey(1.0, 0.5), grey(1.0, 1.0), true),
+    ] {
+        let mut scene = Scene::new();
+        let add = |scene: &mut Scene, number: u32, color| {
+            let z = 0.9 - number as f32 / 100.0;
+            let corners = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]].map(|[x, y]| Vec3::new(x, y, z));
+            let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+            let mesh = scene.add_mesh(mesh.with_colors(vec![color; 4]).unwrap()).unwrap();
+            let material = scene.add_material(Material::translucent("", Vec4::ONE)).unwrap();
+            scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+        };
+        (0..layers).for_each(|number| add(&mut scene, number, front));
+        let view = flat_view(&scene);
+        let render = |scene: &Scene, technique| {
+            Renderer::new().technique(technique).render(scene, &view, Resolve::Blend).unwrap().image
+        };
+        let without = render(&scene, Technique::Oracle);
+        add(&mut scene, layers, behind);
+        (layers + 1..layers + 12).for_each(|number| add(&mut scene, number, front));
+        let expected = render(&scene, Technique::Oracle);
+        assert_eq!(expected == without, ends_early, "{layers} layers");
+        assert!(render(&scene, Technique::Cpu) == expected, "{layers} layers");
+    }
+}
+
 #[test]
 fn of_coplanar_quads_the_later_is_in_front() {
     let (red, green) = (Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, 1.0));

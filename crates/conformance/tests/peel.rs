@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::cell::RefCell;
+
 use glam::{Affine3A, Quat, Vec3, Vec4};
 use pellucid::gpu::GpuRenderer;
 use pellucid::{
@@ -119,33 +121,38 @@ fn exactly_coplanar_squares_show_the_later_drawn_in_front() {
 #[test]
 fn layers_that_are_cut_off_are_counted() {
     for floor in [false, true] {
-        let Some(device) = gpu(floor) else { return };
+        let Some(mut device) = gpu(floor) else { return };
         let scene = pellucid::load("@boxes:n=3").unwrap().scene;
         let view = View::of(&scene).size(83, 61).opacity(0.5);
-        let mut device = device;
-        let renderer = peel(device);
-        let layers = gather(&renderer, &scene, &view).unwrap();
-        let pixels = || (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
-        let greatest = pixels().map(|(x, y)| layers.depth_complexity(x, y)).max().unwrap();
+        let render = |device: &GpuRenderer, resolve| device.render(&scene, &view, resolve, Technique::Peel).unwrap();
+        let exact = render(&device, Resolve::Blend).image;
+        let complexity = RefCell::default();
+        let count = |layers: &Layers| {
+            let pixels = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+            complexity.replace(pixels.map(|(x, y)| ((x, y), layers.depth_complexity(x, y))).collect());
+        };
+        let stats = device.layers(&scene, &view, Technique::Peel, count).unwrap();
+        assert_eq!(stats.windows, 1);
+        let complexity: Vec<((u32, u32), u32)> = complexity.into_inner();
+        let greatest = complexity.iter().map(|&(_, layers)| layers).max().unwrap();
         for limit in 1..=greatest + 1 {
-            device = gpu(floor).unwrap().max_layers(Some(limit));
-            let cut = pixels().filter(|&(x, y)| layers.depth_complexity(x, y) > limit).count() as u64;
-            let Frame { image, stats } = peel(device).render(&scene, &view, Resolve::Blend).unwrap();
-            assert_eq!(stats.cut_pixels, cut, "{limit} layers");
+            device = device.max_layers(Some(limit));
+            let (cut, whole): (Vec<_>, Vec<_>) = complexity.iter().partition(|(_, layers)| *layers > limit);
+            let Frame { image, stats } = render(&device, Resolve::Blend);
+            assert_eq!(stats.cut_pixels, cut.len() as u64, "{limit} layers");
             assert_eq!(stats.is_exact(), limit >= greatest);
             assert_eq!(stats.max_depth_complexity, greatest.min(limit));
             // What is not cut is the same picture.
-            let exact = renderer.render(&scene, &view, Resolve::Blend).unwrap().image;
-            for (x, y) in pixels().filter(|&(x, y)| layers.depth_complexity(x, y) <= limit) {
+            for ((x, y), _) in whole {
                 assert_eq!(image.pixel(x, y), exact.pixel(x, y));
             }
         }
         // A resolve that asks for no more than is allowed is exact.
-        let limited = peel(gpu(floor).unwrap().max_layers(Some(2)));
+        device = device.max_layers(Some(2));
         for (resolve, is_exact) in
             [(Resolve::Nearest, true), (Resolve::Layer(2), true), (Resolve::Layer(3), false), (Resolve::Gelly, false)]
         {
-            assert_eq!(limited.render(&scene, &view, resolve).unwrap().stats.is_exact(), is_exact, "{resolve}");
+            assert_eq!(render(&device, resolve).stats.is_exact(), is_exact, "{resolve}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Ordered layers to pixels: blended front to back, eight pixels at a time.
+//! Ordered layers to pixels: blended front to back, eight pixels at a time, until nothing behind changes a bit.
 
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
 use glam::{Vec3, Vec4};
@@ -7,6 +7,12 @@ use pellucid_core::composite::Composite;
 use crate::fragments::COLOR;
 use crate::order::{STRIP, Strip};
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
+
+/// Layers blended between two looks at whether anything behind them still counts.
+const LAYERS_A_LOOK: usize = 8;
+
+/// Less than half the distance of an f32 from the next, as a share of it: added to it, this changes no bit.
+const NOTHING: f32 = 1.0 / (1_u32 << 26) as f32;
 
 /// The layers of a strip's pixels blended so far.
 struct StripComposite<S: Simd> {
@@ -24,6 +30,14 @@ impl<S: Simd> StripComposite<S> {
         self.green += green * self.transmittance;
         self.blue += blue * self.transmittance;
         self.transmittance *= 1.0 - alpha;
+    }
+
+    /// Whether nothing behind changes a bit of any pixel, as none of it has more of a channel than `greatest`.
+    #[inline(always)]
+    fn is_complete(&self, greatest: Vec3) -> bool {
+        let hides = |channel: f32x8<S>, greatest: f32| (self.transmittance * greatest).simd_le(channel * NOTHING);
+        let hidden = hides(self.red, greatest.x) & hides(self.green, greatest.y) & hides(self.blue, greatest.z);
+        (hidden & self.transmittance.simd_le(NOTHING)).all_true()
     }
 }
 
@@ -43,8 +57,9 @@ impl TileCapture {
                 }
             }
         }
+        let greatest = frame.greatest_color.max(background.truncate().abs());
         for strip in &self.order.strips {
-            let blended = self.blend_strip(simd, strip, frame);
+            let blended = self.blend_strip(simd, strip, frame, greatest);
             let channel = |values: f32x8<S>| -> [f32; STRIP] { values.into() };
             let (red, green, blue) = (channel(blended.red), channel(blended.green), channel(blended.blue));
             let transmittance = channel(blended.transmittance);
@@ -57,11 +72,11 @@ impl TileCapture {
     }
 
     #[inline(always)]
-    fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>) -> StripComposite<S> {
+    fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>, greatest: Vec3) -> StripComposite<S> {
         let zero = f32x8::splat(simd, 0.0);
         let mut blended = StripComposite { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) };
         let (lights, sources, colors) = self.fragments.lights_and_sources();
-        for row in self.order.rows(strip) {
+        for (i, row) in self.order.rows(strip).iter().enumerate() {
             let numbers = row.0.map(|key| key as u32 as usize);
             let mut layer = [[0.0; STRIP]; 4];
             for (lane, &number) in numbers.iter().enumerate() {
@@ -77,8 +92,7 @@ impl TileCapture {
                 }
             }
             blended.under(layer.map(|channel| f32x8::load_array(simd, channel)));
-            // Exactly 0: nothing behind changes a bit.
-            if blended.transmittance.simd_eq(zero).all_true() {
+            if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
                 break;
             }
         }

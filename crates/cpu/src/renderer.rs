@@ -5,10 +5,11 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use fearless_simd::{Level, dispatch};
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use pellucid_core::pixel_grid::Viewport;
 use pellucid_core::primitive::{Draw, draws};
 use pellucid_core::resolve::{PixelResolver, finish};
+use pellucid_core::shading::GREATEST_COLOR;
 use pellucid_core::stats::Step;
 use pellucid_core::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View};
 use rayon::prelude::*;
@@ -192,6 +193,14 @@ impl CpuRenderer {
     }
 }
 
+/// Nothing that is drawn has more of a channel than this: textures and light only take away.
+fn greatest_color(draws: &[Draw<'_>]) -> Vec3 {
+    draws.iter().fold(Vec3::ZERO, |greatest, draw| {
+        let has_vertex_colors = draw.mesh.colors().is_some();
+        greatest.max(if has_vertex_colors { GREATEST_COLOR } else { draw.material.base_color.abs() }.truncate())
+    })
+}
+
 impl<'a> Run<'a> {
     fn new(scene: &'a Scene, view: &View, level: Level, budget_bytes: usize) -> Result<Self, Error> {
         let start = Instant::now();
@@ -320,7 +329,14 @@ impl<'a> Run<'a> {
         resolve: &(impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync),
     ) -> FragmentCounts {
         let start = Instant::now();
-        let frame = FrameParts { chunks, draws: &self.draws, palette: &self.palette, grid, level: self.level };
+        let frame = FrameParts {
+            chunks,
+            draws: &self.draws,
+            palette: &self.palette,
+            greatest_color: greatest_color(&self.draws),
+            grid,
+            level: self.level,
+        };
         let (mut records, mut small) = (vec![0; grid.tile_count()], vec![0; grid.tile_count()]);
         for bins in chunks.iter().flat_map(|chunk| [&chunk.opaque, &chunk.transparent]) {
             bins.records.add_counts(&mut records);

@@ -1,7 +1,7 @@
 //! One tile: opaque surfaces through a depth buffer, then transparent ones captured in draw order.
 
 use fearless_simd::{Level, Simd, dispatch};
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::pixel_grid::ScreenTriangle;
@@ -108,6 +108,8 @@ pub(crate) struct FrameParts<'a> {
     pub(crate) draws: &'a [Draw<'a>],
     /// Colours of draws where nothing varies, before lighting: that of draw `i` stands at `i + 1`, none at 0.
     pub(crate) palette: &'a [Vec4],
+    /// Nothing that is drawn has more of a channel than this.
+    pub(crate) greatest_color: Vec3,
     pub(crate) grid: &'a TileGrid,
     pub(crate) level: Level,
 }

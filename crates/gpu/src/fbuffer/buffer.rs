@@ -8,8 +8,9 @@ use wgpu::{BindGroup, BindGroupLayout, BufferUsages, ShaderStages};
 use super::raster::Raster;
 use super::sort::{KEY_BYTES, Sort, run_steps};
 use super::target::{OutputPass, RUN, read};
-use super::{Content, Drawing, FBufferError, Keeping, LANES, Program, Target, dispatch};
+use super::{Content, Drawing, FBufferError, Keeping, LANES, Program, Target};
 use crate::Context;
+use crate::pass::grid::dispatch;
 use crate::pass::prefix_sum::PrefixSum;
 use crate::surface::storage_entry;
 

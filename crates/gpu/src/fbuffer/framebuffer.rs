@@ -8,7 +8,8 @@ use pellucid_core::fbuffer::order::Geometry;
 use pellucid_core::fbuffer::{Drawn, Output, Size, Windows};
 use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, ShaderStages};
 
-use super::{Content, Drawing, FBuffer, FBufferError, Groups, Keeping, LANES, Program, Target, dispatch};
+use super::{Content, Drawing, FBuffer, FBufferError, Groups, Keeping, LANES, Program, Target};
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, shaders};

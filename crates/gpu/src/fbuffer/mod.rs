@@ -82,9 +82,3 @@ impl Keeping {
 
 /// Invocations of a workgroup in passes over fragments and runs: `LANES` of the shaders.
 pub(crate) const LANES: u64 = 64;
-
-/// Dispatches so many workgroups, in two dimensions, as one does not reach far enough.
-pub(crate) fn dispatch(pass: &mut wgpu::ComputePass<'_>, groups: u64) {
-    const ROW: u64 = 1024;
-    pass.dispatch_workgroups(groups.min(ROW) as u32, groups.div_ceil(ROW) as u32, 1);
-}

@@ -3,7 +3,8 @@
 
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderStages};
 
-use super::{LANES, dispatch};
+use super::LANES;
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, shaders};

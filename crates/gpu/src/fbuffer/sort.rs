@@ -7,8 +7,9 @@ use bytemuck::{Pod, Zeroable};
 use pellucid_core::fbuffer::sort::{Key, Stage as NetworkStage, stages};
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderStages};
 
+use super::FBufferError;
 use super::target::read;
-use super::{FBufferError, dispatch};
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, shaders};

@@ -8,7 +8,8 @@ use pellucid_core::Image;
 use pellucid_core::fbuffer::Output;
 use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, ShaderStages};
 
-use super::{FBuffer, FBufferError, LANES, dispatch};
+use super::{FBuffer, FBufferError, LANES};
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::compute_pipeline;
 use crate::readback::mapped;
 use crate::surface::{shader, storage_entry};

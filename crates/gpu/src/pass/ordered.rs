@@ -22,6 +22,7 @@ use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, RenderPipeline, ShaderMo
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
 use crate::pass::gather::Gather;
+use crate::pass::grid::dispatch;
 use crate::pass::picture::GROUP_PX;
 use crate::pass::whole_window::WholeWindow;
 use crate::surface::{shader, storage_entry};
@@ -30,9 +31,6 @@ use crate::{Context, GpuError, shaders};
 /// Classes of runs, and pixels of a run. Twins in `shaders/shared/classes.wesl`.
 const CLASSES: u64 = 5;
 const RUN_PX: u64 = 64;
-
-/// Workgroups in a row of a dispatch. Twin in `shaders/shared/classes.wesl`.
-const GRID_WIDTH: u64 = 1024;
 
 /// Runs that a workgroup classifies. Twin in `shaders/pass/classify.wesl`.
 const GROUP_RUNS: u64 = 64;
@@ -189,8 +187,7 @@ impl OrderedPasses {
         let mut pass = frame.compute_pass("classify")?;
         set_groups(&mut pass, groups);
         pass.set_pipeline(self.classify(gpu, one_class));
-        let workgroups = window.pixels().div_ceil(RUN_PX * GROUP_RUNS);
-        pass.dispatch_workgroups(workgroups.min(GRID_WIDTH) as u32, workgroups.div_ceil(GRID_WIDTH) as u32, 1);
+        dispatch(&mut pass, window.pixels().div_ceil(RUN_PX * GROUP_RUNS));
         pass.set_pipeline(&self.prepare);
         pass.set_bind_group(2, &prepared, &[]);
         pass.dispatch_workgroups(1, 1, 1);

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::{BindGroupLayout, BufferUsages, ComputePipeline, ShaderStages};
 
 use crate::frame::Frame;
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::compute_pipeline;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, GpuError, shaders};
@@ -109,11 +110,13 @@ impl PrefixSum {
     pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, groups: &[PrefixSumGroup]) {
         pass.set_pipeline(&self.sum_blocks);
         for (group, blocks) in groups {
-            dispatch(pass, group, *blocks);
+            pass.set_bind_group(0, group, &[]);
+            dispatch(pass, *blocks);
         }
         pass.set_pipeline(&self.add_block_sums);
         for (group, blocks) in groups.iter().rev().skip(1) {
-            dispatch(pass, group, *blocks);
+            pass.set_bind_group(0, group, &[]);
+            dispatch(pass, *blocks);
         }
     }
 
@@ -132,11 +135,4 @@ impl PrefixSum {
             ],
         }))
     }
-}
-
-/// In two dimensions, as one does not reach far enough.
-fn dispatch(pass: &mut wgpu::ComputePass<'_>, group: &wgpu::BindGroup, blocks: u64) {
-    const ROW: u64 = 1024;
-    pass.set_bind_group(0, group, &[]);
-    pass.dispatch_workgroups(blocks.min(ROW) as u32, blocks.div_ceil(ROW) as u32, 1);
 }

@@ -14,12 +14,13 @@ use pellucid_core::primitive::Pass;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderStages};
 
 use super::{Capture, Layouts, Outcome};
+use crate::fbuffer::LANES;
 use crate::fbuffer::geometry::{GridGeometry, SentGeometry};
 use crate::fbuffer::raster::{RUN_BYTES, Raster};
 use crate::fbuffer::sort::{KEY_BYTES, Sort, Step, merge_steps, sort_steps};
-use crate::fbuffer::{LANES, dispatch};
 use crate::frame::Frame;
 use crate::memory::Window;
+use crate::pass::grid::dispatch;
 use crate::pass::ordered::{LfbShaders, OrderedPasses, compute_pipeline};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
