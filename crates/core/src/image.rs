@@ -4,8 +4,8 @@ use glam::Vec4;
 
 use crate::color::{Srgb8Encoder, unorm8};
 
-/// A picture: rows from top to bottom, linear light, premultiplied alpha. By default without any pixels.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// A picture: rows from top to bottom, linear light, premultiplied alpha.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     width: u32,
     height: u32,

@@ -121,36 +121,15 @@ impl CpuRenderer {
     /// # Errors
     /// If the view is invalid or the threads cannot be started.
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
-        let mut image = Image::default();
-        let stats = self.render_into(scene, view, resolve, &mut image)?;
-        Ok(Frame { image, stats })
-    }
-
-    /// Renders a view into the picture of an earlier one, whose memory is used again if the size is the same. After an
-    /// error it may hold parts of both.
-    ///
-    /// # Errors
-    /// If the view is invalid or the threads cannot be started.
-    pub fn render_into(&self, scene: &Scene, view: &View, resolve: Resolve, image: &mut Image) -> Result<Stats, Error> {
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
-            if (image.width(), image.height()) != (view.width, view.height) {
-                *image = filled(view);
-            }
+            let mut image = filled(view);
             let bands: Vec<Mutex<&mut [Vec4]>> =
                 image.pixels_mut().chunks_mut(TILE_PX as usize * view.width as usize).map(Mutex::new).collect();
             let resolver = PixelResolver::new(resolve, view);
             run.for_each_tile(memory, |frame, capture, buffers| {
-                let PixelRect { left, top, right, bottom } = capture.rect;
-                let (left, width) = (left as usize, (right - left + 1) as usize);
-                let (band, first_row) = (top as usize / TILE_PX as usize, top as usize % TILE_PX as usize);
-                let rows = |band| {
-                    let rows = <[Vec4]>::chunks_mut(band, view.width as usize).skip(first_row);
-                    rows.take((bottom - top + 1) as usize).map(|row| &mut row[left..left + width])
-                };
                 if resolve == Resolve::Blend {
                     if capture.fragments.len() == 0 && !capture.has_opaque {
-                        rows(&mut lock(&bands[band])).for_each(|row| row.fill(view.background));
                         return;
                     }
                     capture.blend(frame, view.background, &mut buffers.pixels);
@@ -162,14 +141,19 @@ impl CpuRenderer {
                         buffers.pixels[sample] = resolver.pixel(layers.pixel(x, y), layers.opaque(x, y));
                     }
                 }
-                for (to, from) in rows(&mut lock(&bands[band])).zip(buffers.pixels.chunks(TILE_PX as usize)) {
-                    to.copy_from_slice(&from[..width]);
+                let PixelRect { left, top, right, bottom } = capture.rect;
+                let (left, width) = (left as usize, (right - left + 1) as usize);
+                let (band, first_row) = (top as usize / TILE_PX as usize, top as usize % TILE_PX as usize);
+                let mut band = lock(&bands[band]);
+                let rows = band.chunks_mut(view.width as usize).skip(first_row).take((bottom - top + 1) as usize);
+                for (to, from) in rows.zip(buffers.pixels.chunks(TILE_PX as usize)) {
+                    to[left..left + width].copy_from_slice(&from[..width]);
                 }
             });
             drop(bands);
             let stats = run.finish();
-            finish(resolve, image, &stats);
-            Ok(stats)
+            finish(resolve, &mut image, &stats);
+            Ok(Frame { image, stats })
         })
     }
 

@@ -3,7 +3,7 @@
 #[cfg(feature = "gpu")]
 use std::sync::OnceLock;
 
-use pellucid_core::{Frame, Image, Layers, Resolve, Scene, Stats, Technique, View, oracle};
+use pellucid_core::{Frame, Layers, Resolve, Scene, Stats, Technique, View, oracle};
 use pellucid_cpu::CpuRenderer;
 #[cfg(feature = "gpu")]
 use pellucid_gpu::{ContextOptions, GpuRenderer, Storage};
@@ -106,21 +106,6 @@ impl Renderer {
             #[cfg(not(feature = "gpu"))]
             technique => return Err(Error::NoGpu(technique)),
         })
-    }
-
-    /// Renders a picture in the place of an earlier one. The CPU renderer uses its memory again if the size is the same:
-    /// where there are many pictures and few fragments, that saves a tenth of the time. After an error it may hold parts of
-    /// both.
-    ///
-    /// # Errors
-    /// As [`Self::render`].
-    pub fn render_into(&self, scene: &Scene, view: &View, resolve: Resolve, image: &mut Image) -> Result<Stats, Error> {
-        if self.technique == Technique::Cpu {
-            return Ok(self.cpu.render_into(scene, view, resolve, image)?);
-        }
-        let frame = self.render(scene, view, resolve)?;
-        *image = frame.image;
-        Ok(frame.stats)
     }
 
     /// Hands out the ordered layers behind every pixel, one rectangle of the picture at a time, for a resolve of one's

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pellucid::core::fbuffer::Size;
 use pellucid::gpu::{Context, ContextOptions, GpuError, GpuRenderer, Storage};
 use pellucid::multi_pass::{self, GpuMultiPass, Through};
-use pellucid::{Error, Image, Renderer, Resolve, Scene, Stats, Technique, View};
+use pellucid::{Error, Renderer, Resolve, Scene, Stats, Technique, View};
 use serde::{Deserialize, Serialize};
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
@@ -22,8 +22,6 @@ pub(super) struct Machine {
     threads: usize,
     budget_bytes: Option<u64>,
     cpu: BTreeMap<usize, Renderer>,
-    /// What the CPU drew last: memory for its next picture.
-    image: Image,
     /// Or why there is none.
     gpu: Result<Gpu, String>,
 }
@@ -64,7 +62,7 @@ impl Machine {
             },
         };
         let (backend, threads, budget_bytes) = (plan.backend, plan.threads, plan.budget_bytes);
-        Ok(Self { backend, threads, budget_bytes, cpu: BTreeMap::new(), image: Image::default(), gpu })
+        Ok(Self { backend, threads, budget_bytes, cpu: BTreeMap::new(), gpu })
     }
 
     /// Why a suite cannot have a variant here, if it cannot.
@@ -97,7 +95,7 @@ impl Machine {
         }
         let threads = variant.threads.unwrap_or(self.threads);
         let cpu = self.cpu.entry(threads).or_insert_with(|| Renderer::new().threads(threads));
-        Ok(cpu.render_into(scene, view, Resolve::Blend, &mut self.image)?.into())
+        Ok(cpu.render(scene, view, Resolve::Blend)?.stats.into())
     }
 
     /// Pixels at which a depth filter leaves the finished picture other than one of fragments that are all sorted; `None`
