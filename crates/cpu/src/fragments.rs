@@ -158,7 +158,9 @@ impl Fragments {
         for numbers in [&mut self.samples, &mut self.primitives] {
             u32x8::from_slice(simd, &numbers[from.clone()]).compress(kept).store_slice(&mut numbers[to.clone()]);
         }
-        f32x8::from_slice(simd, &self.depths[from]).compress(kept).store_slice(&mut self.depths[to]);
+        for numbers in [&mut self.depths, &mut self.lights] {
+            f32x8::from_slice(simd, &numbers[from.clone()]).compress(kept).store_slice(&mut numbers[to.clone()]);
+        }
     }
 
     /// Where sources and colours of a vector of shaded fragments go, the first `count` of which are there.

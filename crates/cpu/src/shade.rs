@@ -131,10 +131,11 @@ impl Unshaded {
     }
 
     #[inline(always)]
-    fn shade_simd<S: Simd>(&self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
+    fn shade_simd<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
         let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
-        let end = fragments.end();
         fragments.make_room_after(LANES);
+        self.test_alphas(simd, draw, fragments);
+        let end = fragments.end();
         fragments.make_room_for_colors(self.count + LANES);
         let mut kept = self.first;
         for start in (self.first..end).step_by(LANES) {
@@ -160,6 +161,36 @@ impl Unshaded {
             kept += passed;
         }
         fragments.truncate(kept);
+    }
+
+    /// Leaves out what fails the alpha test, as far as the texture's alpha alone tells: of leaves most, and what is left out
+    /// needs no colour.
+    #[inline(always)]
+    fn test_alphas<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
+        let (Some(cutoff), Some((texture, _))) = (draw.cutoff, draw.texture) else { return };
+        if texture.is_opaque() || draw.mesh.colors().is_some() || draw.mesh.tex_coords().is_none() {
+            return;
+        }
+        let end = fragments.end();
+        let mut kept = self.first;
+        for start in (self.first..end).step_by(LANES) {
+            let count = (end - start).min(LANES);
+            let mut bits = (1 << count) - 1;
+            if let Some(footprints) = self.footprints(simd, texture, start - self.first, count) {
+                let alpha = footprints.alphas(simd, count) * draw.material.base_color.w;
+                bits &= (!alpha.min(GREATEST_COLOR.w).simd_lt(cutoff)).to_bitmask();
+            }
+            let passes = mask32x8::from_bitmask(simd, bits);
+            fragments.keep(simd, start, kept, passes);
+            let (from, to) = (start - self.first, kept - self.first);
+            for values in [&mut self.u, &mut self.v, &mut self.texels_squared] {
+                let passed = f32x8::from_slice(simd, &values[from..from + LANES]).compress(passes);
+                passed.store_slice(&mut values[to..to + LANES]);
+            }
+            kept += bits.count_ones() as usize;
+        }
+        fragments.truncate(kept);
+        self.count = kept - self.first;
     }
 
     /// The colours of the vector of fragments from place `at` on, the first `count` of which are there: lit and
@@ -206,6 +237,30 @@ impl Unshaded {
     /// As [`Texture::sample_scaled`].
     #[inline(always)]
     fn sample<S: Simd>(&self, simd: S, texture: &Texture, at: usize, count: usize) -> [f32x8<S>; 4] {
+        match self.footprints(simd, texture, at, count) {
+            Some(Footprints { near, far: None }) => near.colors(simd, count),
+            Some(Footprints { near, far: Some((far, fraction)) }) => near.colors_between(simd, &far, fraction, count),
+            None => {
+                let range = at..at + LANES;
+                let u = f32x8::from_slice(simd, &self.u[range.clone()]);
+                let v = f32x8::from_slice(simd, &self.v[range.clone()]);
+                let texels_squared = f32x8::from_slice(simd, &self.texels_squared[range]);
+                let colors = sample_each(texture, [u.into(), v.into()], texels_squared.into(), count);
+                channels(simd, colors.as_flattened())
+            }
+        }
+    }
+
+    /// Which texels the vector of fragments from place `at` on sees, the first `count` of which are there; `None` where
+    /// filters are mixed, or coordinates have no value.
+    #[inline(always)]
+    fn footprints<'t, S: Simd>(
+        &self,
+        simd: S,
+        texture: &'t Texture,
+        at: usize,
+        count: usize,
+    ) -> Option<Footprints<'t>> {
         let range = at..at + LANES;
         let u = f32x8::from_slice(simd, &self.u[range.clone()]);
         let v = f32x8::from_slice(simd, &self.v[range.clone()]);
@@ -217,24 +272,23 @@ impl Unshaded {
             && sampler.minify == Filter::Linear
             && sampler.mip != Some(Filter::Nearest);
         if !all_linear || odd.to_bitmask() & lanes != 0 {
-            let colors = sample_each(texture, [u.into(), v.into()], texels_squared.into(), count);
-            return channels(simd, colors.as_flattened());
+            return None;
         }
         let last = texture.levels().len() as f32 - 1.0;
         let minified = texels_squared.simd_gt(1.0);
         let zero = i32x8::splat(simd, 0);
         if sampler.mip.is_none() || minified.to_bitmask() & lanes == 0 {
-            return Footprints::new(simd, texture, zero, [u, v]).colors(simd, count);
+            return Some(Footprints { near: LevelFootprints::new(simd, texture, zero, [u, v]), far: None });
         }
         let level = minified.select((log2(simd, texels_squared) * 0.5).min(last), zero.to_float());
         let whole: i32x8<S> = level.to_int();
         let fraction = level - whole.to_float::<f32x8<S>>();
-        let near = Footprints::new(simd, texture, whole, [u, v]);
+        let near = LevelFootprints::new(simd, texture, whole, [u, v]);
         if fraction.simd_gt(0.0).to_bitmask() & lanes == 0 {
-            return near.colors(simd, count);
+            return Some(Footprints { near, far: None });
         }
-        let far = Footprints::new(simd, texture, (whole + 1).min(last as i32), [u, v]);
-        near.colors_between(simd, &far, fraction.into(), count)
+        let far = LevelFootprints::new(simd, texture, (whole + 1).min(last as i32), [u, v]);
+        Some(Footprints { near, far: Some((far, fraction.into())) })
     }
 }
 
@@ -313,8 +367,25 @@ fn log2<S: Simd>(simd: S, value: f32x8<S>) -> f32x8<S> {
     exponent.to_float::<f32x8<S>>() + (mantissa - 1.0)
 }
 
-/// The four texels around each of eight coordinates, each on a level of its own.
+/// The texels around each of eight coordinates.
 struct Footprints<'a> {
+    near: LevelFootprints<'a>,
+    /// Those on the next smaller level, and how far each colour is on the way there.
+    far: Option<(LevelFootprints<'a>, [f32; LANES])>,
+}
+
+impl Footprints<'_> {
+    /// The alphas of the first `count`.
+    #[inline(always)]
+    fn alphas<S: Simd>(&self, simd: S, count: usize) -> f32x8<S> {
+        let near = self.near.alphas(simd, count);
+        let Some((far, fraction)) = &self.far else { return near };
+        near + (far.alphas(simd, count) - near) * f32x8::load_array(simd, *fraction)
+    }
+}
+
+/// The four texels around each of eight coordinates, each on a level of its own.
+struct LevelFootprints<'a> {
     levels: &'a [MipLevel],
     /// Whether no texel is translucent.
     is_opaque: bool,
@@ -326,7 +397,7 @@ struct Footprints<'a> {
     down: [f32; LANES],
 }
 
-impl<'a> Footprints<'a> {
+impl<'a> LevelFootprints<'a> {
     #[inline(always)]
     fn new<S: Simd>(simd: S, texture: &'a Texture, level: i32x8<S>, [u, v]: [f32x8<S>; 2]) -> Self {
         let levels = texture.levels();
@@ -359,6 +430,26 @@ impl<'a> Footprints<'a> {
         let above = top_left + (top_right - top_left) * self.across[lane];
         let below = bottom_left + (bottom_right - bottom_left) * self.across[lane];
         above + (below - above) * self.down[lane]
+    }
+
+    /// The alphas of the first `count`, as [`Self::color`] has them.
+    #[inline(always)]
+    fn alphas<S: Simd>(&self, simd: S, count: usize) -> f32x8<S> {
+        let values = TexelValues::get();
+        let mut corners = [[0.0; LANES]; 4];
+        for lane in 0..count {
+            let texels: &[[u8; 4]] = &self.levels[self.level[lane] as usize].texels;
+            for (corner, places) in corners.iter_mut().zip(&self.places) {
+                corner[lane] = values.alpha[texels[places[lane] as usize][3] as usize];
+            }
+        }
+        let [top_left, top_right, bottom_left, bottom_right] = corners;
+        let (top_left, top_right) = (f32x8::load_array(simd, top_left), f32x8::load_array(simd, top_right));
+        let (bottom_left, bottom_right) = (f32x8::load_array(simd, bottom_left), f32x8::load_array(simd, bottom_right));
+        let across = f32x8::load_array(simd, self.across);
+        let above = top_left + (top_right - top_left) * across;
+        let below = bottom_left + (bottom_right - bottom_left) * across;
+        above + (below - above) * f32x8::load_array(simd, self.down)
     }
 
     /// The colours of the first `count`, channel by channel.
@@ -409,6 +500,7 @@ impl<'a> Footprints<'a> {
 /// Linear light and alpha of a texel.
 #[inline(always)]
 fn texel<S: Simd, const OPAQUE: bool>(simd: S, values: &TexelValues, texel: [u8; 4]) -> f32x4<S> {
+    // Through a number, so that there is one load instead of four.
     let [red, green, blue, alpha] = u32::from_le_bytes(texel).to_le_bytes().map(usize::from);
     let alpha = if OPAQUE { 1.0 } else { values.alpha[alpha] };
     f32x4::load_array(simd, [values.linear[red], values.linear[green], values.linear[blue], alpha])
