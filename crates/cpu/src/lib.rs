@@ -13,6 +13,7 @@ mod networks;
 mod order;
 mod raster;
 mod renderer;
+mod sample;
 mod setup;
 mod shade;
 mod sight;

@@ -197,7 +197,7 @@ impl CpuRenderer {
 fn greatest_color(draws: &[Draw<'_>]) -> Vec3 {
     draws.iter().fold(Vec3::ZERO, |greatest, draw| {
         let has_vertex_colors = draw.mesh.colors().is_some();
-        greatest.max(if has_vertex_colors { GREATEST_COLOR } else { draw.material.base_color.abs() }.truncate())
+        greatest.max(if has_vertex_colors { GREATEST_COLOR } else { draw.material.base_color }.truncate())
     })
 }
 
