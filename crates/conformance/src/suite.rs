@@ -87,8 +87,8 @@ pub const CASES: &[Case] = &[
     translucent("@teapot:tessellation=5", (67, 45), 0.3),
     translucent("@spheres:n=24,subdivisions=2", (67, 49), 0.6),
     // Depth complexity beyond any fixed number of layers.
-    usual("@planes:n=1000", (37, 21)),
-    usual("@planes:n=64", (33, 129)),
+    usual("@planes:n=1000", (19, 13)),
+    usual("@planes:n=64", (33, 67)),
     // Inside geometry: triangles cross the near plane and leave the picture on all sides.
     from("@boxes:n=3", "from inside", (45.0, 90.0, 0.0), (67, 45), 0.7),
     from("@boxes:n=3", "from within", (200.0, -35.0, 0.3), (67, 45), 0.7),

@@ -114,7 +114,8 @@ impl SmallTriangles {
             return;
         }
         // The planes of weights and of depth, as `ScreenTriangle` has them.
-        let corners = &self.corners[..triangle_count];
+        // Lanes without a triangle have corners of another, which do no harm.
+        let corners = &self.corners;
         let a: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 0, vertices.positions);
         let b: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 1, vertices.positions);
         let c: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 2, vertices.positions);
@@ -141,9 +142,9 @@ impl SmallTriangles {
         if draw.lit
             && let Some(normals) = draw.mesh.normals()
         {
-            let a = in_view(draw, gather(simd, corners, |corners| normals[corners[0] as usize]));
-            let b = in_view(draw, gather(simd, corners, |corners| normals[corners[1] as usize]));
-            let c = in_view(draw, gather(simd, corners, |corners| normals[corners[2] as usize]));
+            let a = in_view(draw, gather(simd, |lane| normals[corners[lane][0] as usize]));
+            let b = in_view(draw, gather(simd, |lane| normals[corners[lane][1] as usize]));
+            let c = in_view(draw, gather(simd, |lane| normals[corners[lane][2] as usize]));
             let weights = [second.to_f32(), third.to_f32()];
             normal_planes = Some([
                 normal_plane(a[0] * a_inv_w, b[0] * b_inv_w, c[0] * c_inv_w, &weights),
@@ -151,7 +152,7 @@ impl SmallTriangles {
                 normal_plane(a[2] * a_inv_w, b[2] * b_inv_w, c[2] * c_inv_w, &weights),
             ]);
         } else if draw.lit {
-            let normal = gather(simd, &self.triangles[..triangle_count], |&triangle| flat_normal(draw, triangle));
+            let normal = gather(simd, |lane| flat_normal(draw, self.triangles[lane]));
             steady_light = light(simd, in_view(draw, normal));
         }
 
@@ -276,24 +277,50 @@ fn unit(edge: Vec3) -> Vec3 {
     edge / edge.abs().max_element().max(f32::MIN_POSITIVE)
 }
 
+/// What there is for each lane. Written out, so that it goes to registers: vectors that are loaded from where their lanes
+/// have just been stored wait for it.
+#[inline(always)]
+fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; LANES] {
+    [
+        of(0),
+        of(1),
+        of(2),
+        of(3),
+        of(4),
+        of(5),
+        of(6),
+        of(7),
+        of(8),
+        of(9),
+        of(10),
+        of(11),
+        of(12),
+        of(13),
+        of(14),
+        of(15),
+    ]
+}
+
 /// A vector for each of sixteen lanes, as structure of arrays.
 #[inline(always)]
-fn gather<S: Simd, T>(simd: S, lanes: &[T], vector: impl Fn(&T) -> Vec3) -> [f32x16<S>; 3] {
-    let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for (lane, from) in lanes.iter().enumerate() {
-        [x[lane], y[lane], z[lane]] = vector(from).to_array();
-    }
-    [f32x16::load_array(simd, x), f32x16::load_array(simd, y), f32x16::load_array(simd, z)]
+fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x16<S>; 3] {
+    let vectors = each_lane(vector);
+    [
+        f32x16::load_array(simd, each_lane(|lane| vectors[lane].x)),
+        f32x16::load_array(simd, each_lane(|lane| vectors[lane].y)),
+        f32x16::load_array(simd, each_lane(|lane| vectors[lane].z)),
+    ]
 }
 
 /// Pairs of numbers at one corner of each triangle.
 #[inline(always)]
-fn gather_pairs<S: Simd, V: SimdBase<S>>(simd: S, corners: &[[u32; 3]], k: usize, from: &[[V::Element; 2]]) -> (V, V) {
-    let mut pairs = [[V::Element::default(); 2]; LANES];
-    for (pair, corners) in pairs.iter_mut().zip(corners) {
-        *pair = from[corners[k] as usize];
-    }
-    load_pairs(simd, &pairs)
+fn gather_pairs<S: Simd, V: SimdBase<S>>(
+    simd: S,
+    corners: &[[u32; 3]; LANES],
+    k: usize,
+    from: &[[V::Element; 2]],
+) -> (V, V) {
+    load_pairs(simd, &each_lane(|lane| from[corners[lane][k] as usize]))
 }
 
 /// Normals in camera space.
