@@ -1,17 +1,48 @@
-//! Every exact technique of the GPU against the oracle, in every case of the suite; its bits at any budget and every time.
+//! Every exact technique of the GPU against the oracle, in every case of the suite; its bits at any budget and every time,
+//! and, of those that differ in where they keep fragments and in nothing else, the bits of each other.
 
 mod common;
 
+use std::cell::RefCell;
+
 use pellucid::core::oracle;
 use pellucid::gpu::{GpuError, GpuRenderer};
-use pellucid::{Error, Renderer, Resolve, Technique, View};
-use pellucid_conformance::suite::{Candidate, Check, Prepared, prepare_all};
+use pellucid::{Error, Image, Layers, Renderer, Resolve, Scene, Technique, View};
+use pellucid_conformance::suite::{Candidate, Check, Prepared, Subject, prepare_all};
 
 use common::gpu;
 
 /// Exact techniques that run on the GPU.
 fn techniques() -> impl Iterator<Item = Technique> {
     Technique::ALL.into_iter().filter(|technique| technique.backend() == "gpu" && technique.is_exact())
+}
+
+/// Layered fragment buffers.
+const LFBS: [Technique; 4] = [Technique::Linear, Technique::List, Technique::Pages, Technique::ABuffer];
+
+/// Remembers all that a technique has made.
+struct Witness<'a> {
+    candidate: &'a Candidate,
+    layers: RefCell<Vec<Layers>>,
+    images: RefCell<Vec<Image>>,
+}
+
+impl Subject for Witness<'_> {
+    fn layers(&self, scene: &Scene, view: &View) -> Result<Layers, Error> {
+        let layers = self.candidate.layers(scene, view)?;
+        self.layers.borrow_mut().push(layers.clone());
+        Ok(layers)
+    }
+
+    fn picture(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Image, Error> {
+        let image = self.candidate.picture(scene, view, resolve)?;
+        self.images.borrow_mut().push(image.clone());
+        Ok(image)
+    }
+
+    fn has_own_rounding(&self) -> bool {
+        self.candidate.has_own_rounding()
+    }
 }
 
 #[test]
@@ -31,9 +62,12 @@ fn agree_with_the_oracle(floor: bool) {
     let mut candidate = Candidate::new(Technique::Linear, Renderer::new().gpu(device));
     let cases = prepare_all().unwrap();
     let mut failures = Vec::new();
+    // For each case what the first LFB made of it.
+    let mut first_made = vec![None; cases.len()];
     for technique in techniques() {
         candidate = candidate.technique(technique);
-        for (case, prepared) in &cases {
+        for ((case, prepared), first_made) in cases.iter().zip(&mut first_made) {
+            let witness = Witness { candidate: &candidate, layers: RefCell::default(), images: RefCell::default() };
             for check in Check::ALL {
                 // Of a thousand planes either takes up to half a minute for one check: `verify` has all of them.
                 let is_long =
@@ -41,10 +75,14 @@ fn agree_with_the_oracle(floor: bool) {
                 if is_long && check != if floor { Check::Picture(Resolve::Gelly) } else { Check::Layers } {
                     continue;
                 }
-                let comparison = prepared.run(check, &candidate).unwrap_or_else(|error| panic!("{case:?}: {error}"));
+                let comparison = prepared.run(check, &witness).unwrap_or_else(|error| panic!("{case:?}: {error}"));
                 if !comparison.passes() {
                     failures.push(format!("{technique}, {case:?}, {check}: {comparison:?}"));
                 }
+            }
+            let made = (witness.layers.into_inner(), witness.images.into_inner());
+            if LFBS.contains(&technique) && *first_made.get_or_insert_with(|| made.clone()) != made {
+                failures.push(format!("{technique}, {case:?}: other bits than another layered fragment buffer"));
             }
         }
     }

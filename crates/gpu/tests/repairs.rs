@@ -74,7 +74,7 @@ fn a_thousand_layers_are_in_order() {
     });
 }
 
-/// The other storage of the A-buffer; techniques are held together in `conformance/tests/gpu_same_bits.rs`.
+/// The other storage of the A-buffer; techniques are held together in `conformance/tests/gpu.rs`.
 #[test]
 fn textures_give_the_same_bits_as_buffers() {
     let cases: Vec<_> = CASES.iter().map(|case| (case, case.prepare().unwrap())).collect();

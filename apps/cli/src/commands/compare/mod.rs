@@ -50,6 +50,13 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
     }
 
     let technique = plan.reference.unwrap_or_else(|| reference::usual(scene, &view));
+    if let Some(wait) = reference::long_wait(scene, &view).filter(|_| technique == Technique::Oracle) {
+        let sentence = format!(
+            "the oracle tests every triangle against every pixel, here for some {} minutes; `--reference cpu` is as exact",
+            wait.as_secs().div_ceil(60)
+        );
+        progress.suspend(|| terminal::warn(&sentence));
+    }
     progress.stage(format!("rendering the reference ({technique})"));
     let reference = Reference::capture(technique, plan.device.cpu(), scene, &view, plan.resolve)?;
     progress.stage("looking at its layers");

@@ -1,5 +1,7 @@
 //! What techniques are held against.
 
+use std::time::Duration;
+
 use pellucid::core::oracle::{self, Capture};
 use pellucid::{Image, Layers, Renderer, Resolve, Scene, Stats, Technique, View};
 
@@ -23,8 +25,18 @@ enum Source {
 
 /// The oracle where it takes seconds, else the CPU renderer.
 pub(super) fn usual(scene: &Scene, view: &View) -> Technique {
-    let work = u64::from(scene.primitive_count()) * u64::from(view.width) * u64::from(view.height);
-    if work <= ORACLE_REACH { Technique::Oracle } else { Technique::Cpu }
+    if oracle_work(scene, view) <= ORACLE_REACH { Technique::Oracle } else { Technique::Cpu }
+}
+
+/// About how long the oracle takes, where that is more than seconds.
+pub(super) fn long_wait(scene: &Scene, view: &View) -> Option<Duration> {
+    let work = oracle_work(scene, view);
+    (work > ORACLE_REACH).then(|| Duration::from_secs(work / (ORACLE_REACH / 10)))
+}
+
+/// Triangles times pixels.
+fn oracle_work(scene: &Scene, view: &View) -> u64 {
+    u64::from(scene.primitive_count()) * u64::from(view.width) * u64::from(view.height)
 }
 
 impl Reference {
