@@ -69,7 +69,7 @@ fn agree_with_the_oracle(floor: bool) {
         for ((case, prepared), first_made) in cases.iter().zip(&mut first_made) {
             let witness = Witness { candidate: &candidate, layers: RefCell::default(), images: RefCell::default() };
             for check in Check::ALL {
-                // Of a thousand planes either takes up to half a minute for one check: `verify` has all of them.
+                // Of a thousand planes either takes seconds for one check: `verify` has all of them.
                 let is_long =
                     case.source == "@planes:n=1000" && matches!(technique, Technique::Peel | Technique::FBuffer);
                 if is_long && check != if floor { Check::Picture(Resolve::Gelly) } else { Check::Layers } {
@@ -125,7 +125,7 @@ fn bits_depend_on_neither_budget_nor_repetition() {
 
 #[test]
 fn sorting_before_the_resolve_changes_no_bit() {
-    for technique in [Technique::Linear, Technique::List, Technique::ABuffer, Technique::Pages] {
+    for technique in LFBS {
         for source in ["@planes:n=300", "@hairball:strands=60", "@gallery"] {
             let (Some(device), Some(presorting)) = (gpu(false), gpu(false)) else { return };
             let scene = pellucid::load(source).unwrap().scene;

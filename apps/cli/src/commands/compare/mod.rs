@@ -20,6 +20,7 @@ use crate::commands::{warn_about, warn_about_dropped};
 use crate::plan::{ComparePlan, Compared};
 use crate::progress::Progress;
 use crate::report::to_json;
+use crate::words::plural;
 use crate::{legend, terminal};
 use document::Document;
 use measure::{Measured, measure};
@@ -50,10 +51,11 @@ pub(crate) fn run(plan: &ComparePlan) -> anyhow::Result<()> {
     }
 
     let technique = plan.reference.unwrap_or_else(|| reference::usual(scene, &view));
-    if let Some(wait) = reference::long_wait(scene, &view).filter(|_| technique == Technique::Oracle) {
+    let minutes = reference::oracle_minutes(scene, &view);
+    if technique == Technique::Oracle && minutes > 0 {
         let sentence = format!(
-            "the oracle tests every triangle against every pixel, here for some {} minutes; `--reference cpu` is as exact",
-            wait.as_secs().div_ceil(60)
+            "the oracle tests every triangle against every pixel, here for some {}; `--reference cpu` is as exact",
+            plural(minutes, "minute")
         );
         progress.suspend(|| terminal::warn(&sentence));
     }

@@ -1,7 +1,5 @@
 //! What techniques are held against.
 
-use std::time::Duration;
-
 use pellucid::core::oracle::{self, Capture};
 use pellucid::{Image, Layers, Renderer, Resolve, Scene, Stats, Technique, View};
 
@@ -28,10 +26,9 @@ pub(super) fn usual(scene: &Scene, view: &View) -> Technique {
     if oracle_work(scene, view) <= ORACLE_REACH { Technique::Oracle } else { Technique::Cpu }
 }
 
-/// About how long the oracle takes, where that is more than seconds.
-pub(super) fn long_wait(scene: &Scene, view: &View) -> Option<Duration> {
-    let work = oracle_work(scene, view);
-    (work > ORACLE_REACH).then(|| Duration::from_secs(work / (ORACLE_REACH / 10)))
+/// About how many minutes the oracle takes.
+pub(super) fn oracle_minutes(scene: &Scene, view: &View) -> u64 {
+    oracle_work(scene, view) / (6 * ORACLE_REACH)
 }
 
 /// Triangles times pixels.
