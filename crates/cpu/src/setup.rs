@@ -5,6 +5,7 @@ use fearless_simd::Simd;
 use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, outcode, twice_signed_area};
 use pellucid_core::primitive::{Corners, Draw, Fold, Pass, Piece};
 use pellucid_core::shading::CornerNormals;
+use prefetch_index::prefetch_index;
 
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
@@ -76,6 +77,9 @@ impl SetupScratch {
         self.opaque.bytes() + self.transparent.bytes()
     }
 }
+
+/// Triangles between those at hand and those whose corners are fetched meanwhile.
+const FETCHED_AHEAD: usize = 2 * LANES;
 
 /// Triangles of one draw that a chunk sets up.
 #[derive(Debug, Clone)]
@@ -160,9 +164,13 @@ impl Chunk {
         new: &mut NewFragments,
     ) {
         let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
+        let ahead = triangles.get(FETCHED_AHEAD..).unwrap_or_default().chunks(LANES).chain(std::iter::repeat(&[][..]));
         let mut small = SmallTriangles::default();
         let mut corners = [[[0; 2]; LANES]; 3];
-        for (first, triangles) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)) {
+        for ((first, triangles), ahead) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)).zip(ahead) {
+            for &vertex in ahead.as_flattened() {
+                prefetch_index(vertices.positions, vertex as usize);
+            }
             if triangles.len() < LANES {
                 // Triangles without area, which are never in sight.
                 corners = [[[0; 2]; LANES]; 3];
@@ -190,6 +198,7 @@ impl Chunk {
                     }
                     let [a, b, c] = triangles[lane];
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
+                    small.fetch(corners, draw, vertices);
                     for (block, covered) in blocks {
                         if covered != 0 && small.push(first + lane, corners, block, covered) {
                             small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);

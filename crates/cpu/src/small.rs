@@ -8,6 +8,7 @@ use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, f32x16, i32x16};
 use glam::Vec3;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
+use prefetch_index::prefetch_index;
 
 use crate::bin::{TILE_PX, TileGrid};
 use crate::simd::{Wide, light};
@@ -71,6 +72,20 @@ pub(crate) struct SmallTriangles {
 }
 
 impl SmallTriangles {
+    #[inline(always)]
+    pub(crate) fn fetch(&self, corners: [u32; 3], draw: &Draw<'_>, vertices: DrawVertices<'_>) {
+        for corner in corners {
+            prefetch_index(vertices.depths, corner as usize);
+        }
+        if draw.lit
+            && let Some(normals) = draw.mesh.normals()
+        {
+            for corner in corners {
+                prefetch_index(normals, corner as usize);
+            }
+        }
+    }
+
     /// Adds a triangle; returns whether there are sixteen.
     #[inline(always)]
     pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {

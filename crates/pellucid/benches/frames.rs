@@ -23,12 +23,13 @@ const fn case(name: &'static str, file: &'static str, stand_in: &'static str) ->
 }
 
 /// Seen from the front.
-const CASES: [Case; 7] = [
+const CASES: [Case; 8] = [
     case("bunny_144k", "stanford_bunny/bunny_144k.ply", "@spheres:n=112"),
     case("dragon_871k", "stanford_dragon/dragon_871k.ply", "@spheres:n=680"),
     case("sintel_hair_tubes", "sintel_hair/sintel_hair_tubes.ply", "@hairball:strands=7000,segments=24"),
     case("conference", "conference_room/conference.glb", "@boxes:n=30"),
     case("oak_tree", "oak_tree/oak_tree.glb", "@tree"),
+    case("brain", "brain/brain_fsaverage5.glb", "@spheres:n=64"),
     case("boxes", "", "@boxes:n=20"),
     Case { size: (1920, 1080), frames: 3, ..case("planes_1g", "", "@planes:n=500") },
 ];
