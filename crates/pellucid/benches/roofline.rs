@@ -2,17 +2,17 @@
 //!
 //! Micro-benchmarks tell what a byte, a fragment, a comparison and a layer cost at least: their loops do what no exact
 //! renderer can leave out, on data in the cache, without a decision. Then each step of whole frames stands beside its floor,
-//! and last come the SIMD levels, raster to resolve alone. Scenes are found as by `frames`.
+//! and last come the SIMD levels, raster to resolve alone.
 
 mod common;
 
 use std::hint::black_box;
 use std::time::Instant;
 
+use common::{SCENES, case};
 use fearless_simd::{Level, Simd, SimdBase, SimdNarrow, SimdSplit, dispatch, f32x8, f64x8, u32x8};
-use glam::{Vec3, Vec4};
-use pellucid::core::view::direction;
-use pellucid::{Camera, Resolve, Scene, Stats, View};
+use glam::Vec4;
+use pellucid::{Resolve, Scene, Stats, View};
 use pellucid_cpu::{CpuRenderer, simd};
 
 /// What a machine can do at best, on all its cores together.
@@ -23,44 +23,20 @@ struct Peaks {
     blended_per_ms: f64,
 }
 
-struct Case {
-    name: &'static str,
-    file: &'static str,
-    stand_in: &'static str,
-    opacity: f32,
-    /// Eye and target; seen from the front without.
-    between: Option<[Vec3; 2]>,
-}
-
-const fn case(name: &'static str, file: &'static str, stand_in: &'static str) -> Case {
-    Case { name, file, stand_in, opacity: 0.3, between: None }
-}
-
-const ATRIUM: [Vec3; 2] = [Vec3::new(-6.0, 2.0, 0.0), Vec3::new(2.0, 3.0, 0.0)];
-
-const CASES: [Case; 10] = [
-    case("bunny_144k", "stanford_bunny/bunny_144k.ply", "@spheres:n=112"),
-    case("dragon_871k", "stanford_dragon/dragon_871k.ply", "@spheres:n=680"),
-    case("sintel_hair_tubes", "sintel_hair/sintel_hair_tubes.ply", "@hairball:strands=7000,segments=24"),
-    Case { opacity: 0.5, between: Some(ATRIUM), ..case("Sponza", "crytek_sponza/crytek_sponza.glb", "@gallery") },
-    case("conference", "conference_room/conference.glb", "@boxes:n=30"),
-    case("oak_tree", "oak_tree/oak_tree.glb", "@tree"),
-    case("boxes", "", "@boxes:n=20"),
-    case("planes_16", "", "@planes:n=16"),
-    case("planes_256", "", "@planes:n=256"),
-    case("planes_1024", "", "@planes:n=1024"),
-];
-
 fn main() {
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let is_wanted = |case: &&Case| wanted.is_empty() || wanted.iter().any(|name| case.name.contains(name));
+    let planes = [
+        case("planes_16", "", "@planes:n=16"),
+        case("planes_256", "", "@planes:n=256"),
+        case("planes_1024", "", "@planes:n=1024"),
+    ];
+    let cases = common::wanted(SCENES.into_iter().chain(planes));
     let peaks = peaks();
     println!("\nms of each step of a frame at 1280 x 720 / its floor\n");
     println!(
         "{:<18} {:>10} {:>12} {:>9}  {:<17} {:<17} {:<17} {:<17} {:<17}",
         "scene", "triangles", "fragments", "ms", "transform", "set-up, bin", "raster", "order", "shade, resolve"
     );
-    for case in CASES.iter().filter(is_wanted) {
+    for case in &cases {
         let (scene, view) = case.load();
         let stats = median(&CpuRenderer::new(0), &scene, &view, 9);
         let floors = peaks.floors(&scene, &stats);
@@ -82,7 +58,7 @@ fn main() {
         );
     }
     println!("\nms from raster to resolve, by SIMD level, and times faster than scalar\n");
-    for case in CASES.iter().filter(is_wanted) {
+    for case in &cases {
         let (scene, view) = case.load();
         let mut scalar_ms = None;
         let mut columns = Vec::new();
@@ -258,27 +234,6 @@ fn blend<S: Simd>(simd: S, room: &Room) -> f64 {
     let sums: [[f32; 8]; 3] = [sums[0].into(), sums[1].into(), sums[2].into()];
     black_box(sums);
     ROOM as f64
-}
-
-impl Case {
-    fn load(&self) -> (Scene, View) {
-        let file = common::scene_folder()
-            .map(|folder| folder.join(self.file))
-            .filter(|file| !self.file.is_empty() && file.exists());
-        let source = file.map_or(self.stand_in.to_owned(), |file| file.display().to_string());
-        let scene = match pellucid::load(&source) {
-            Ok(loaded) => loaded.scene,
-            Err(error) => panic!("{}: {error}", self.name),
-        };
-        let mut view = View::of(&scene).size(1280, 720).opacity(self.opacity);
-        if let Some([eye, target]) = self.between {
-            (view.camera.eye, view.camera.target) = (eye, target);
-        } else if scene.cameras().is_empty() {
-            let sphere = scene.bounding_sphere();
-            view.camera = Camera::fitted(sphere, direction(0.0, 0.0), 30f32.to_radians(), view.aspect() as f32);
-        }
-        (scene, view)
-    }
 }
 
 /// The figures of the median of so many frames, after one that allocates.
