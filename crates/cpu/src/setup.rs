@@ -92,11 +92,11 @@ pub(crate) struct Span {
     pub(crate) count: usize,
 }
 
-/// Triangles in a chunk: enough for each thread to get many, so that all end at about the same time, but not so many that
-/// what is between set-up and tiles leaves the second-level cache, nor so few that tiles find little in each.
+/// Triangles in a chunk: few enough for each thread to get several, so that all end at about the same time, but so many
+/// that tiles find something in each.
 pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize) -> usize {
     // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
-    (total / (threads * 16)).clamp(1024, 16_384.max(2 * tiles))
+    (total / (threads * 8)).clamp(1024, 32_768.max(2 * tiles))
 }
 
 /// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.
