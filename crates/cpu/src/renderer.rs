@@ -123,11 +123,12 @@ impl CpuRenderer {
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
-            let mut image = filled(view);
+            // The one is bound by memory, the other is not.
+            let (begun, mut image) = rayon::join(|| run.begin(memory), || filled(view));
             let bands: Vec<Mutex<&mut [Vec4]>> =
                 image.pixels_mut().chunks_mut(TILE_PX as usize * view.width as usize).map(Mutex::new).collect();
             let resolver = PixelResolver::new(resolve, view);
-            run.for_each_tile(memory, |frame, capture, buffers| {
+            run.for_each_tile(memory, begun, |frame, capture, buffers| {
                 if resolve == Resolve::Blend {
                     if capture.fragments.len() == 0 && !capture.has_opaque {
                         return;
@@ -165,7 +166,8 @@ impl CpuRenderer {
     pub fn layers(&self, scene: &Scene, view: &View, visit: impl Fn(&Layers) + Sync) -> Result<Stats, Error> {
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
-            run.for_each_tile(memory, |frame, capture, buffers| {
+            let begun = run.begin(memory);
+            run.for_each_tile(memory, begun, |frame, capture, buffers| {
                 capture.layers(frame, &mut buffers.layers);
                 visit(&buffers.layers);
             });
@@ -201,6 +203,20 @@ fn greatest_color(draws: &[Draw<'_>]) -> Vec3 {
     })
 }
 
+/// A window with its triangles set up.
+struct WindowSetUp {
+    grid: TileGrid,
+    chunks: Vec<Chunk>,
+    /// How many triangles were dropped, or which part of all there is in as much as the budget allows.
+    dropped_triangles: Result<u64, f64>,
+}
+
+/// The windows of a frame, the first of which is set up.
+struct Begun {
+    windows: Windows,
+    first: Option<WindowSetUp>,
+}
+
 impl<'a> Run<'a> {
     fn new(scene: &'a Scene, view: &View, level: Level, budget_bytes: usize) -> Result<Self, Error> {
         let start = Instant::now();
@@ -223,24 +239,38 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Sets up the first window.
+    fn begin(&mut self, memory: &mut Memory) -> Begun {
+        let mut windows = memory.windows(&self.viewport, self.budget_bytes);
+        let first = self.next_window(&mut windows, memory);
+        Begun { windows, first }
+    }
+
+    fn next_window(&mut self, windows: &mut Windows, memory: &mut Memory) -> Option<WindowSetUp> {
+        let window = windows.next()?;
+        let grid = TileGrid::new(self.viewport, window);
+        let mut chunks = std::mem::take(&mut memory.chunks);
+        let dropped_triangles = self.set_up(&grid, memory, &mut chunks, grid.tile_count() == 1);
+        Some(WindowSetUp { grid, chunks, dropped_triangles })
+    }
+
     /// Captures every tile and hands it to `resolve`, on all threads, window by window.
     fn for_each_tile(
         &mut self,
         memory: &mut Memory,
+        begun: Begun,
         resolve: impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync,
     ) {
         let mut counts = FragmentCounts::default();
-        let mut windows = memory.windows(&self.viewport, self.budget_bytes);
         let mut last = LastFrame { viewport: Some(self.viewport), ..LastFrame::default() };
-        while let Some(window) = windows.next() {
-            let grid = TileGrid::new(self.viewport, window);
-            let mut chunks = std::mem::take(&mut memory.chunks);
-            match self.set_up(&grid, memory, &mut chunks, grid.tile_count() == 1) {
+        let Begun { mut windows, first: mut next } = begun;
+        while let Some(WindowSetUp { grid, chunks, dropped_triangles }) = next {
+            match dropped_triangles {
                 Ok(dropped_triangles) => {
                     self.stats.dropped_triangles = dropped_triangles;
                     counts = counts.merged(self.capture_tiles(&grid, memory, &chunks, &resolve));
                     last.bytes += chunks.iter().map(Chunk::bytes).sum::<usize>();
-                    last.windows.push(window);
+                    last.windows.push(grid.window);
                 }
                 Err(part) => {
                     let mut bytes = vec![0; grid.tile_count()];
@@ -255,6 +285,7 @@ impl<'a> Run<'a> {
             if windows.is_empty() && last.windows.len() == 1 {
                 memory.chunks = chunks;
             }
+            next = self.next_window(&mut windows, memory);
         }
         self.stats.windows = last.windows.len() as u32;
         self.stats.fragments = counts.fragments;
@@ -343,7 +374,8 @@ impl<'a> Run<'a> {
             bins.small.add_counts(&mut small);
         }
         let mut tiles: Vec<u32> = (0..grid.tile_count() as u32).collect();
-        tiles.sort_unstable_by_key(|&tile| std::cmp::Reverse(records[tile as usize] + small[tile as usize]));
+        // Those that cost about the same stay next to each other, as what chunks have for them is.
+        tiles.sort_by_key(|&tile| std::cmp::Reverse((records[tile as usize] + small[tile as usize]).checked_ilog2()));
         let spare = Mutex::new(std::mem::take(&mut memory.workers));
         let next = AtomicUsize::new(0);
         let results = Mutex::new((FragmentCounts::default(), [Duration::ZERO; 3], 0));
