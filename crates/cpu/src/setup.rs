@@ -9,7 +9,7 @@ use prefetch_index::prefetch_index;
 
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
-use crate::small::{LANES, MOST_FRAGMENTS, NewFragments, SmallFragments, SmallTriangles};
+use crate::small::{self, LANES, MOST_FRAGMENTS, NewFragments, SmallFragments, SmallTriangles};
 use crate::transform::{DrawVertices, outcode};
 
 /// A triangle in sight, or a piece of a clipped one.
@@ -78,7 +78,7 @@ impl SetupScratch {
     }
 }
 
-/// Triangles between those at hand and those whose corners are fetched meanwhile.
+/// Triangles between those at hand and those whose corners are fetched into the cache meanwhile.
 const FETCHED_AHEAD: usize = 2 * LANES;
 
 /// Triangles of one draw that a chunk sets up.
@@ -168,7 +168,8 @@ impl Chunk {
         let mut small = SmallTriangles::default();
         let mut corners = [[[0; 2]; LANES]; 3];
         for ((first, triangles), ahead) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)).zip(ahead) {
-            for &vertex in ahead.as_flattened() {
+            // The other corners are mostly those of neighbours.
+            for &[vertex, ..] in ahead {
                 prefetch_index(vertices.positions, vertex as usize);
             }
             if triangles.len() < LANES {
@@ -198,7 +199,7 @@ impl Chunk {
                     }
                     let [a, b, c] = triangles[lane];
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
-                    small.fetch(corners, draw, vertices);
+                    small::fetch(corners, draw, vertices);
                     for (block, covered) in blocks {
                         if covered != 0 && small.push(first + lane, corners, block, covered) {
                             small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);

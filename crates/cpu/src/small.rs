@@ -72,20 +72,6 @@ pub(crate) struct SmallTriangles {
 }
 
 impl SmallTriangles {
-    #[inline(always)]
-    pub(crate) fn fetch(&self, corners: [u32; 3], draw: &Draw<'_>, vertices: DrawVertices<'_>) {
-        for corner in corners {
-            prefetch_index(vertices.depths, corner as usize);
-        }
-        if draw.lit
-            && let Some(normals) = draw.mesh.normals()
-        {
-            for corner in corners {
-                prefetch_index(normals, corner as usize);
-            }
-        }
-    }
-
     /// Adds a triangle; returns whether there are sixteen.
     #[inline(always)]
     pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {
@@ -228,6 +214,21 @@ impl SmallTriangles {
             }
         }
         fragments.count = place;
+    }
+}
+
+/// Fetches into the cache what making fragments of a triangle takes beside the positions of its corners.
+#[inline(always)]
+pub(crate) fn fetch(corners: [u32; 3], draw: &Draw<'_>, vertices: DrawVertices<'_>) {
+    for corner in corners {
+        prefetch_index(vertices.depths, corner as usize);
+    }
+    if draw.lit
+        && let Some(normals) = draw.mesh.normals()
+    {
+        for corner in corners {
+            prefetch_index(normals, corner as usize);
+        }
     }
 }
 
