@@ -85,7 +85,8 @@ struct Run<'a> {
     start: Instant,
 }
 
-/// The steps of a frame. Those of tiles run side by side: what they took together is shared out.
+/// The steps of a frame. Those of tiles run side by side: what they took together is shared out. The background is filled
+/// during the first two.
 const STEPS: [&str; 5] = ["transform", "clip, setup and bin", "raster", "order", "shade and resolve"];
 
 impl CpuRenderer {

@@ -1,8 +1,14 @@
 //! Whole frames of the CPU renderer, without loading: `cargo bench -p pellucid [-- NAME ...]`.
 //!
 //! Prints the median and the spread of each scene's frames, in milliseconds.
+//!
+//! With `--on-request` it renders a frame for each line of its input, which is the number of one of the scenes named, and
+//! prints the milliseconds it took. So two builds are compared frame by frame in turns, which on a machine that others use
+//! too tells apart what differs by a few hundredths.
 
 mod common;
+
+use std::io::stdin;
 
 use common::{Case, SCENES, case};
 use pellucid::{Renderer, Resolve};
@@ -13,6 +19,9 @@ const FRAMES: usize = 25;
 const FRAMES_OF_A_BILLION: usize = 3;
 
 fn main() {
+    if std::env::args().any(|argument| argument == "--on-request") {
+        return render_on_request();
+    }
     println!(
         "{:<20} {:>10} {:>12} {:>5} {:>9} {:>9} {:>9} {:>8}  steps of the last frame",
         "scene", "triangles", "fragments", "depth", "median ms", "least", "greatest", "peak MiB"
@@ -22,6 +31,21 @@ fn main() {
     }
     for case in common::wanted([Case { size: (1920, 1080), ..case("planes_1g", "", "@planes:n=500") }]) {
         measure(&case, FRAMES_OF_A_BILLION);
+    }
+}
+
+fn render_on_request() {
+    let loaded: Vec<_> = common::wanted(SCENES).iter().map(Case::load).collect();
+    let renderer = Renderer::new();
+    for line in stdin().lines().map_while(Result::ok) {
+        let Some((scene, view)) = line.trim().parse().ok().and_then(|number: usize| loaded.get(number)) else {
+            println!("{line:?} is not the number of a scene: there are {}", loaded.len());
+            continue;
+        };
+        match renderer.render(scene, view, Resolve::Blend) {
+            Ok(frame) => println!("{}", frame.stats.total_ms),
+            Err(error) => println!("{error}"),
+        }
     }
 }
 
