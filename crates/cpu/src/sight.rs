@@ -28,6 +28,8 @@ pub(crate) struct Sight {
     pub(crate) top: [i32; LANES],
     width: [i32; LANES],
     height: [i32; LANES],
+    /// Whether a small one has samples to the right of the window or below it.
+    leaves_window: bool,
     /// Blocks side by side, and one above another.
     block_columns: usize,
     block_rows: usize,
@@ -46,8 +48,9 @@ impl Sight {
         let (min_x, min_y) = (ax.min(bx).min(cx), ay.min(by).min(cy));
         let (max_x, max_y) = (ax.max(bx).max(cx), ay.max(by).max(cy));
         let (left, top) = (first_sample(min_x, grid.window.left), first_sample(min_y, grid.window.top));
-        let right = last_sample(max_x, grid.window.right);
-        let bottom = last_sample(max_y, grid.window.bottom);
+        let (last_column, last_row) = (last_sample(max_x), last_sample(max_y));
+        let (right, bottom) = (last_column.min(grid.window.right), last_row.min(grid.window.bottom));
+        let leaves_window = last_column.simd_gt(right) | last_row.simd_gt(bottom);
         let hit = left.simd_le(right) & top.simd_le(bottom) & !outside;
         let is_small = (max_x - min_x).simd_lt(SMALL_SUBPIXELS) & (max_y - min_y).simd_lt(SMALL_SUBPIXELS);
         let others = (hit & !is_small) | outside;
@@ -66,6 +69,7 @@ impl Sight {
             top: top.into(),
             width: (right - left).into(),
             height: (bottom - top).into(),
+            leaves_window: (leaves_window & small).any_true(),
             block_columns: 0,
             block_rows: 0,
             halves: [[[0; LANES]; 2]; BLOCKS],
@@ -107,8 +111,11 @@ impl Sight {
                 let [low, high] = &self.halves[block_row * 2 + block_column];
                 let covered = u64::from(low[lane] as u32) | u64::from(high[lane] as u32) << 32;
                 // Beyond the bounds there are no samples, but beyond the window there may be.
-                let (columns, rows) = (self.width[lane] - across, self.height[lane] - down);
-                let in_window = columns_mask(columns) & rows_mask(rows);
+                let mut in_window = u64::MAX;
+                if self.leaves_window {
+                    let (columns, rows) = (self.width[lane] - across, self.height[lane] - down);
+                    in_window = columns_mask(columns) & rows_mask(rows);
+                }
                 let first = [self.left[lane] + across, self.top[lane] + down];
                 blocks[block_row * 2 + block_column] = (first, covered & in_window);
             }
@@ -176,10 +183,10 @@ fn first_sample<S: Simd>(subpixels: i32x16<S>, first: i32) -> i32x16<S> {
     ((subpixels + (SUBPIXELS / 2 - 1)) >> 8).max(first)
 }
 
-/// The last sample at or before a coordinate, up to the window's last.
+/// The last sample at or before a coordinate.
 #[inline(always)]
-fn last_sample<S: Simd>(subpixels: i32x16<S>, last: i32) -> i32x16<S> {
-    ((subpixels - SUBPIXELS / 2) >> 8).min(last)
+fn last_sample<S: Simd>(subpixels: i32x16<S>) -> i32x16<S> {
+    (subpixels - SUBPIXELS / 2) >> 8
 }
 
 /// An edge as [`pellucid_core::pixel_grid::Edge`] has it: change for one sample to the right and downwards, and value at a
