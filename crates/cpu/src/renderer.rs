@@ -307,7 +307,8 @@ impl<'a> Run<'a> {
         let level = self.level;
         let draws = &*self.draws;
         let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
-        let chunk_triangles = chunk_triangles(self.triangles as usize, rayon::current_num_threads(), grid.tile_count());
+        let (triangles, threads) = (self.triangles as usize, rayon::current_num_threads());
+        let chunk_triangles = chunk_triangles(triangles, threads, grid.tile_count(), self.budget_bytes);
         let (budget_bytes, held_bytes) =
             (if is_single_tile { usize::MAX } else { self.budget_bytes }, AtomicUsize::new(0));
         let triangles_done = AtomicUsize::new(0);

@@ -92,11 +92,16 @@ pub(crate) struct Span {
     pub(crate) count: usize,
 }
 
-/// Triangles in a chunk: few enough for each thread to get several, so that all end at about the same time, but so many
-/// that tiles find something in each.
-pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize) -> usize {
+/// Bytes of the budget for each triangle of a chunk. One that is being filled takes some 100 a triangle beyond the budget,
+/// which should not be much of it.
+const BUDGET_FOR_A_TRIANGLE: usize = 512;
+
+/// Triangles in a chunk: few enough for each thread to get several, so that all end at about the same time, and for the
+/// budget, but so many that tiles find something in each.
+pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize, budget_bytes: usize) -> usize {
+    let most = (budget_bytes / BUDGET_FOR_A_TRIANGLE).clamp(1024, 32_768);
     // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
-    (total / (threads * 8)).clamp(1024, 32_768.max(2 * tiles))
+    (total / (threads * 8)).clamp(1024, most.max(2 * tiles))
 }
 
 /// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.
