@@ -285,6 +285,8 @@ impl<'a> Run<'a> {
             // Chunks that held much of one window would add up with those that hold much of another.
             if windows.is_empty() && last.windows.len() == 1 {
                 memory.chunks = chunks;
+            } else {
+                drop(chunks);
             }
             next = self.next_window(&mut windows, memory);
         }
