@@ -4,7 +4,7 @@
 //! levels are made by an exact box filter in linear light, weighted by alpha, so that colours under transparent texels
 //! do not bleed.
 
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use glam::{Vec2, Vec4};
 
@@ -13,6 +13,9 @@ use crate::color::{linear_from_srgb8, srgb8_from_linear, unorm8};
 
 /// Largest width or height of a texture, in texels.
 pub const MAX_TEXTURE_SIZE_PX: u32 = 16_384;
+
+/// Mip levels of the largest texture.
+const MAX_LEVELS: usize = MAX_TEXTURE_SIZE_PX.ilog2() as usize + 1;
 
 /// What lies beyond the edge of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -76,11 +79,22 @@ pub struct MipLevel {
 }
 
 /// A texture with all its mip levels.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Texture {
     levels: Vec<MipLevel>,
     is_opaque: bool,
     sampler: Sampler,
+    alpha_quads: OnceLock<AlphaQuads>,
+}
+
+/// The alphas of the four texels around each place between texels side by side: what an alpha test needs of a level, in one
+/// read instead of four.
+#[derive(Debug, Clone)]
+pub struct AlphaQuads {
+    /// Number of each level's first quad.
+    firsts: [u32; MAX_LEVELS.next_power_of_two()],
+    /// Top left, top right, bottom left, bottom right, wrapped.
+    quads: Vec<[u8; 4]>,
 }
 
 /// What the 256 values of a texel's channel mean.
@@ -134,7 +148,7 @@ impl Texture {
             }
         }
         let is_opaque = levels.iter().all(|level| level.texels.iter().all(|texel| texel[3] == u8::MAX));
-        Ok(Self { levels, is_opaque, sampler })
+        Ok(Self { levels, is_opaque, sampler, alpha_quads: OnceLock::new() })
     }
 
     /// All levels, the full size first.
@@ -150,6 +164,11 @@ impl Texture {
     /// How it is sampled.
     pub fn sampler(&self) -> Sampler {
         self.sampler
+    }
+
+    /// The alphas around all places of all levels, which are gathered when first asked for.
+    pub fn alpha_quads(&self) -> &AlphaQuads {
+        self.alpha_quads.get_or_init(|| AlphaQuads::new(&self.levels, self.sampler))
     }
 
     /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
@@ -210,6 +229,37 @@ impl Texture {
                 above + (below - above) * fy
             }
         }
+    }
+}
+
+impl AlphaQuads {
+    fn new(levels: &[MipLevel], sampler: Sampler) -> Self {
+        let mut firsts = [0; MAX_LEVELS.next_power_of_two()];
+        let mut quads = Vec::new();
+        let side = |texels: i32, wrap: Wrap| if wrap == Wrap::MirroredRepeat { texels * 2 + 1 } else { texels + 1 };
+        for (level, first) in levels.iter().zip(&mut firsts) {
+            *first = quads.len() as u32;
+            let (width, height) = (level.width as i32, level.height as i32);
+            let row = |y: i32| wrap_texel(y, height, sampler.wrap_v) * width as usize;
+            let column = |x: i32| wrap_texel(x, width, sampler.wrap_u);
+            for y in 0..side(height, sampler.wrap_v) {
+                let (top, bottom) = (row(y - 1), row(y));
+                let alpha = |row: usize, x: i32| level.texels[row + column(x)][3];
+                quads.extend(
+                    (0..side(width, sampler.wrap_u))
+                        .map(|x| [alpha(top, x - 1), alpha(top, x), alpha(bottom, x - 1), alpha(bottom, x)]),
+                );
+            }
+        }
+        Self { firsts, quads }
+    }
+
+    /// A level's quad of this number. They lie row by row: from the one before the first texel to the one behind the last, of
+    /// mirrored textures behind the last of the mirror image.
+    #[inline(always)]
+    pub fn quad(&self, level: i32, number: i32) -> [u8; 4] {
+        let first = self.firsts[level as usize % MAX_LEVELS.next_power_of_two()];
+        self.quads[first as usize + number as usize]
     }
 }
 

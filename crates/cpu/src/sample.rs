@@ -1,8 +1,9 @@
-//! Textures sampled at eight coordinates: which texels, and their colours or alphas alone. The operations are those of
+//! Textures sampled at eight coordinates: their colours, or alphas alone. The operations are those of
 //! [`Texture::sample_scaled`], in the same order.
 
 use fearless_simd::{
     Bytes, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdInterleaved, SimdMask, f32x4, f32x8, i32x8,
+    u32x8,
 };
 use glam::Vec2;
 use pellucid_core::Texture;
@@ -24,23 +25,35 @@ impl<S: Simd> OnTexture<S> {
     /// The colours of the first `count`, channel by channel, as [`Texture::sample_scaled`].
     #[inline(always)]
     pub(crate) fn sample(&self, simd: S, texture: &Texture, count: usize) -> [f32x8<S>; 4] {
-        match self.footprints(simd, texture, count) {
-            Some(Footprints { near, far: None }) => near.colors(simd, count),
-            Some(Footprints { near, far: Some((far, fraction)) }) => near.colors_between(simd, &far, fraction, count),
-            None => {
-                let colors = sample_each(texture, [self.u.into(), self.v.into()], self.texels_squared.into(), count);
-                channels(simd, colors.as_flattened())
+        let Some(Levels { near, far }) = self.levels(simd, texture, count) else {
+            let colors = sample_each(texture, [self.u.into(), self.v.into()], self.texels_squared.into(), count);
+            return channels(simd, colors.as_flattened());
+        };
+        let near = Footprints::new(simd, texture, near, self);
+        match far {
+            None => near.colors(simd, count),
+            Some((far, fraction)) => {
+                let far = Footprints::new(simd, texture, far, self);
+                near.colors_between(simd, &far, fraction.into(), count)
             }
         }
     }
 
-    /// Which texels the first `count` see; `None` where filters are mixed, or coordinates have no value.
+    /// Alphas alone of the first `count`; `None` where filters are mixed, or coordinates have no value.
     #[inline(always)]
-    pub(crate) fn footprints<'t>(&self, simd: S, texture: &'t Texture, count: usize) -> Option<Footprints<'t>> {
-        let Self { u, v, texels_squared } = *self;
+    pub(crate) fn alphas(&self, simd: S, texture: &Texture, count: usize) -> Option<f32x8<S>> {
+        let Levels { near, far } = self.levels(simd, texture, count)?;
+        let near = self.level_alphas(simd, texture, near, count);
+        let Some((far, fraction)) = far else { return Some(near) };
+        Some(near + (self.level_alphas(simd, texture, far, count) - near) * fraction)
+    }
+
+    /// Which levels the first `count` see; `None` where filters are mixed, or coordinates have no value.
+    #[inline(always)]
+    fn levels(&self, simd: S, texture: &Texture, count: usize) -> Option<Levels<S>> {
         let sampler = texture.sampler();
         let lanes = (1 << count) - 1;
-        let odd = !u.is_finite() | !v.is_finite() | texels_squared.is_nan();
+        let odd = !self.u.is_finite() | !self.v.is_finite() | self.texels_squared.is_nan();
         let all_linear = sampler.magnify == Filter::Linear
             && sampler.minify == Filter::Linear
             && sampler.mip != Some(Filter::Nearest);
@@ -48,21 +61,49 @@ impl<S: Simd> OnTexture<S> {
             return None;
         }
         let last = texture.levels().len() as f32 - 1.0;
-        let minified = texels_squared.simd_gt(1.0);
+        let minified = self.texels_squared.simd_gt(1.0);
         let zero = i32x8::splat(simd, 0);
         if sampler.mip.is_none() || minified.to_bitmask() & lanes == 0 {
-            return Some(Footprints { near: LevelFootprints::new(simd, texture, zero, [u, v]), far: None });
+            return Some(Levels { near: zero, far: None });
         }
-        let level = minified.select((log2(simd, texels_squared) * 0.5).min(last), zero.to_float());
-        let whole: i32x8<S> = level.to_int();
-        let fraction = level - whole.to_float::<f32x8<S>>();
-        let near = LevelFootprints::new(simd, texture, whole, [u, v]);
+        let level = minified.select((log2(simd, self.texels_squared) * 0.5).min(last), zero.to_float());
+        let near: i32x8<S> = level.to_int();
+        let fraction = level - near.to_float::<f32x8<S>>();
         if fraction.simd_gt(0.0).to_bitmask() & lanes == 0 {
-            return Some(Footprints { near, far: None });
+            return Some(Levels { near, far: None });
         }
-        let far = LevelFootprints::new(simd, texture, (whole + 1).min(last as i32), [u, v]);
-        Some(Footprints { near, far: Some((far, fraction.into())) })
+        Some(Levels { near, far: Some(((near + 1).min(last as i32), fraction)) })
     }
+
+    /// The alphas of the first `count` on a level each.
+    #[inline(always)]
+    fn level_alphas(&self, simd: S, texture: &Texture, level: i32x8<S>, count: usize) -> f32x8<S> {
+        let sampler = texture.sampler();
+        let [width, height] = level_size(simd, texture, level);
+        let (left, across) = texel_before(self.u, width, sampler.wrap_u);
+        let (top, down) = texel_before(self.v, height, sampler.wrap_v);
+        let columns = if sampler.wrap_u == Wrap::MirroredRepeat { width * 2 } else { width };
+        let numbers: [i32; LANES] = ((top + 1) * (columns + 1) + (left + 1)).into();
+        let level: [i32; LANES] = level.into();
+        let quads = texture.alpha_quads();
+        let mut found = [0; LANES];
+        for lane in 0..count {
+            found[lane] = u32::from_le_bytes(quads.quad(level[lane], numbers[lane]));
+        }
+        let found = u32x8::load_array(simd, found).bitcast();
+        let (top_left, top_right) = (alpha(found), alpha(found >> 8));
+        let (bottom_left, bottom_right) = (alpha(found >> 16), alpha(found >> 24));
+        let above = top_left + (top_right - top_left) * across;
+        let below = bottom_left + (bottom_right - bottom_left) * across;
+        above + (below - above) * down
+    }
+}
+
+/// Which levels eight coordinates are sampled on.
+struct Levels<S: Simd> {
+    near: i32x8<S>,
+    /// The next smaller one, and how far each colour is on the way there.
+    far: Option<(i32x8<S>, f32x8<S>)>,
 }
 
 /// Each lane on its own: where filters are mixed, or coordinates have no value.
@@ -90,25 +131,8 @@ fn log2<S: Simd>(simd: S, value: f32x8<S>) -> f32x8<S> {
     exponent.to_float::<f32x8<S>>() + (mantissa - 1.0)
 }
 
-/// The texels around each of eight coordinates.
-pub(crate) struct Footprints<'a> {
-    near: LevelFootprints<'a>,
-    /// Those on the next smaller level, and how far each colour is on the way there.
-    far: Option<(LevelFootprints<'a>, [f32; LANES])>,
-}
-
-impl Footprints<'_> {
-    /// The alphas of the first `count`.
-    #[inline(always)]
-    pub(crate) fn alphas<S: Simd>(&self, simd: S, count: usize) -> f32x8<S> {
-        let near = self.near.alphas(simd, count);
-        let Some((far, fraction)) = &self.far else { return near };
-        near + (far.alphas(simd, count) - near) * f32x8::load_array(simd, *fraction)
-    }
-}
-
 /// The four texels around each of eight coordinates, each on a level of its own.
-struct LevelFootprints<'a> {
+struct Footprints<'a> {
     levels: &'a [MipLevel],
     /// Whether no texel is translucent.
     is_opaque: bool,
@@ -120,19 +144,16 @@ struct LevelFootprints<'a> {
     down: [f32; LANES],
 }
 
-impl<'a> LevelFootprints<'a> {
+impl<'a> Footprints<'a> {
     #[inline(always)]
-    fn new<S: Simd>(simd: S, texture: &'a Texture, level: i32x8<S>, [u, v]: [f32x8<S>; 2]) -> Self {
-        let levels = texture.levels();
+    fn new<S: Simd>(simd: S, texture: &'a Texture, level: i32x8<S>, at: &OnTexture<S>) -> Self {
         let sampler = texture.sampler();
-        // Each level is half as large as the one before.
-        let width = (i32x8::splat(simd, levels[0].width as i32) >> level).max(1);
-        let height = (i32x8::splat(simd, levels[0].height as i32) >> level).max(1);
-        let (left, right, across) = texel_pair(simd, u, width, sampler.wrap_u);
-        let (top, bottom, down) = texel_pair(simd, v, height, sampler.wrap_v);
+        let [width, height] = level_size(simd, texture, level);
+        let (left, right, across) = texel_pair(simd, at.u, width, sampler.wrap_u);
+        let (top, bottom, down) = texel_pair(simd, at.v, height, sampler.wrap_v);
         let (top, bottom) = (top * width, bottom * width);
         Self {
-            levels,
+            levels: texture.levels(),
             is_opaque: texture.is_opaque(),
             level: level.into(),
             places: [(top + left).into(), (top + right).into(), (bottom + left).into(), (bottom + right).into()],
@@ -153,26 +174,6 @@ impl<'a> LevelFootprints<'a> {
         let above = top_left + (top_right - top_left) * self.across[lane];
         let below = bottom_left + (bottom_right - bottom_left) * self.across[lane];
         above + (below - above) * self.down[lane]
-    }
-
-    /// The alphas of the first `count`, as [`Self::color`] has them.
-    #[inline(always)]
-    fn alphas<S: Simd>(&self, simd: S, count: usize) -> f32x8<S> {
-        let values = TexelValues::get();
-        let mut corners = [[0.0; LANES]; 4];
-        for lane in 0..count {
-            let texels: &[[u8; 4]] = &self.levels[self.level[lane] as usize].texels;
-            for (corner, places) in corners.iter_mut().zip(&self.places) {
-                corner[lane] = values.alpha[texels[places[lane] as usize][3] as usize];
-            }
-        }
-        let [top_left, top_right, bottom_left, bottom_right] = corners;
-        let (top_left, top_right) = (f32x8::load_array(simd, top_left), f32x8::load_array(simd, top_right));
-        let (bottom_left, bottom_right) = (f32x8::load_array(simd, bottom_left), f32x8::load_array(simd, bottom_right));
-        let across = f32x8::load_array(simd, self.across);
-        let above = top_left + (top_right - top_left) * across;
-        let below = bottom_left + (bottom_right - bottom_left) * across;
-        above + (below - above) * f32x8::load_array(simd, self.down)
     }
 
     /// The colours of the first `count`, channel by channel.
@@ -238,9 +239,32 @@ pub(crate) fn channels<S: Simd>(simd: S, colors: &[f32]) -> [f32x8<S>; 4] {
     [red.combine(high_red), green.combine(high_green), blue.combine(high_blue), alpha.combine(high_alpha)]
 }
 
+/// Texels along the sides of levels, each half as large as the one before.
+#[inline(always)]
+fn level_size<S: Simd>(simd: S, texture: &Texture, level: i32x8<S>) -> [i32x8<S>; 2] {
+    let full_size = &texture.levels()[0];
+    let width = i32x8::splat(simd, full_size.width as i32) >> level;
+    let height = i32x8::splat(simd, full_size.height as i32) >> level;
+    [width.max(1), height.max(1)]
+}
+
+/// The alpha in the lowest byte, as [`TexelValues`] has it.
+#[inline(always)]
+fn alpha<S: Simd>(texel: i32x8<S>) -> f32x8<S> {
+    (texel & 0xff).to_float::<f32x8<S>>() / 255.0
+}
+
 /// Along one axis of a level: the texels before and behind a coordinate, and the share of the latter.
 #[inline(always)]
 fn texel_pair<S: Simd>(simd: S, coordinate: f32x8<S>, size: i32x8<S>, wrap: Wrap) -> (i32x8<S>, i32x8<S>, f32x8<S>) {
+    let (before, share_behind) = texel_before(coordinate, size, wrap);
+    (wrap_texel(simd, before, size, wrap), wrap_texel(simd, before + 1, size, wrap), share_behind)
+}
+
+/// Along one axis of a level: the position of the texel before a coordinate, which may be off the level, and the share of the
+/// one behind.
+#[inline(always)]
+fn texel_before<S: Simd>(coordinate: f32x8<S>, size: i32x8<S>, wrap: Wrap) -> (i32x8<S>, f32x8<S>) {
     let in_unit = match wrap {
         Wrap::Repeat => coordinate - floor(coordinate),
         Wrap::MirroredRepeat => coordinate - floor(coordinate * 0.5) * 2.0,
@@ -248,8 +272,7 @@ fn texel_pair<S: Simd>(simd: S, coordinate: f32x8<S>, size: i32x8<S>, wrap: Wrap
     };
     let at = in_unit * size.to_float::<f32x8<S>>() - 0.5;
     let before = floor(at);
-    let first: i32x8<S> = before.to_int();
-    (wrap_texel(simd, first, size, wrap), wrap_texel(simd, first + 1, size, wrap), at - before)
+    (before.to_int(), at - before)
 }
 
 /// The greatest whole number that is not above `t`: rounded towards zero, as every level can, from 2^23 on as it is.

@@ -176,8 +176,8 @@ impl Unshaded {
         for start in (self.first..end).step_by(LANES) {
             let count = (end - start).min(LANES);
             let mut bits = (1 << count) - 1;
-            if let Some(footprints) = self.on_texture(simd, start - self.first).footprints(simd, texture, count) {
-                let alpha = footprints.alphas(simd, count) * draw.material.base_color.w;
+            if let Some(alphas) = self.on_texture(simd, start - self.first).alphas(simd, texture, count) {
+                let alpha = alphas * draw.material.base_color.w;
                 bits &= (!alpha.min(GREATEST_COLOR.w).simd_lt(cutoff)).to_bitmask();
             }
             let passes = mask32x8::from_bitmask(simd, bits);

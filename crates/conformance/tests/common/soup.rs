@@ -1,7 +1,7 @@
 //! Random triangle soups, and cameras amid them.
 
 use glam::{Affine3A, Quat, Vec2, Vec3, Vec3Swizzles, Vec4};
-use pellucid::core::texture::Sampler;
+use pellucid::core::texture::{Sampler, Wrap};
 use pellucid::{AlphaMode, Camera, Instance, Material, Mesh, Projection, Scene, Texture};
 use proptest::prelude::*;
 
@@ -74,13 +74,20 @@ fn look() -> impl Strategy<Value = Look> {
     })
 }
 
+fn texture() -> impl Strategy<Value = Texture> {
+    let wrap = || prop_oneof![2 => Just(Wrap::Repeat), 1 => Just(Wrap::MirroredRepeat), 1 => Just(Wrap::ClampToEdge)];
+    (wrap(), wrap()).prop_map(|(wrap_u, wrap_v)| {
+        let texels = (0..63u8).map(|i| [i * 3, 255 - i * 2, 90, if i % 3 == 0 { 40 } else { 230 }]).collect();
+        Texture::new(9, 7, texels, Sampler { wrap_u, wrap_v, ..Sampler::default() }).unwrap()
+    })
+}
+
 /// A few instances of a few triangles each, of every kind.
 pub(crate) fn soup() -> impl Strategy<Value = Scene> {
     let instance = (prop::collection::vec(triangle(), 1..25), look(), any::<bool>());
-    prop::collection::vec(instance, 1..4).prop_map(|instances| {
+    (prop::collection::vec(instance, 1..4), texture()).prop_map(|(instances, texture)| {
         let mut scene = Scene::new();
-        let texels = (0..64u8).map(|i| [i * 3, 255 - i * 2, 90, if i % 3 == 0 { 40 } else { 230 }]).collect();
-        let texture = scene.add_texture(Texture::new(8, 8, texels, Sampler::default()).unwrap()).unwrap();
+        let texture = scene.add_texture(texture).unwrap();
         for (triangles, look, mirrored) in instances {
             let positions: Vec<Vec3> = triangles.as_flattened().to_vec();
             let count = positions.len() as u32;
