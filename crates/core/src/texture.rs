@@ -74,14 +74,21 @@ pub struct MipLevel {
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// `width * height` texels, row by row from the top.
-    pub texels: Vec<[u8; 4]>,
+    /// Number of its first texel among those of the texture.
+    pub first_texel: u32,
+}
+
+impl MipLevel {
+    fn texel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
 }
 
 /// A texture with all its mip levels.
 #[derive(Debug, Clone)]
 pub struct Texture {
     levels: Vec<MipLevel>,
+    texels: Vec<[u8; 4]>,
     is_opaque: bool,
     sampler: Sampler,
     alpha_quads: OnceLock<AlphaQuads>,
@@ -141,19 +148,31 @@ impl Texture {
         if texels.len() != width as usize * height as usize {
             return Err(Error::Texture(format!("{} texels for {width} x {height}", texels.len())));
         }
-        let mut levels = vec![MipLevel { width, height, texels }];
+        let (mut levels, mut texels) = (vec![MipLevel { width, height, first_texel: 0 }], texels);
         if sampler.mip.is_some() {
-            while let Some(smaller) = half(&levels[levels.len() - 1]) {
+            // Each level has a quarter of the one above, or half if that is one texel wide.
+            texels.reserve_exact(if width.min(height) == 1 { texels.len() } else { texels.len() / 2 });
+            while let Some(smaller) = push_half(&levels[levels.len() - 1], &mut texels) {
                 levels.push(smaller);
             }
         }
-        let is_opaque = levels.iter().all(|level| level.texels.iter().all(|texel| texel[3] == u8::MAX));
-        Ok(Self { levels, is_opaque, sampler, alpha_quads: OnceLock::new() })
+        let is_opaque = texels.iter().all(|texel| texel[3] == u8::MAX);
+        Ok(Self { levels, texels, is_opaque, sampler, alpha_quads: OnceLock::new() })
     }
 
     /// All levels, the full size first.
     pub fn levels(&self) -> &[MipLevel] {
         &self.levels
+    }
+
+    /// The texels of all levels, the full size first, each level row by row from the top.
+    pub fn texels(&self) -> &[[u8; 4]] {
+        &self.texels
+    }
+
+    /// Those of one of its levels.
+    pub fn level_texels(&self, level: &MipLevel) -> &[[u8; 4]] {
+        &self.texels[level.first_texel as usize..][..level.texel_count()]
     }
 
     /// Whether every texel of every level is opaque.
@@ -168,7 +187,7 @@ impl Texture {
 
     /// The alphas around all places of all levels, which are gathered when first asked for.
     pub fn alpha_quads(&self) -> &AlphaQuads {
-        self.alpha_quads.get_or_init(|| AlphaQuads::new(&self.levels, self.sampler))
+        self.alpha_quads.get_or_init(|| AlphaQuads::new(self))
     }
 
     /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
@@ -209,12 +228,13 @@ impl Texture {
     #[inline]
     fn sample_level(&self, level: usize, filter: Filter, uv: Vec2) -> Vec4 {
         let level = &self.levels[level];
+        let texels = self.level_texels(level);
         let u = wrap_unit(uv.x, self.sampler.wrap_u) * level.width as f32;
         let v = wrap_unit(uv.y, self.sampler.wrap_v) * level.height as f32;
         let column = |x: i32| wrap_texel(x, level.width as i32, self.sampler.wrap_u);
         let row = |y: i32| wrap_texel(y, level.height as i32, self.sampler.wrap_v) * level.width as usize;
         let decoder = &*DECODER;
-        let at = |row: usize, column: usize| decoder.decode(level.texels[row + column]);
+        let at = |row: usize, column: usize| decoder.decode(texels[row + column]);
         match filter {
             Filter::Nearest => at(row(floor(v) as i32), column(floor(u) as i32)),
             Filter::Linear => {
@@ -233,18 +253,20 @@ impl Texture {
 }
 
 impl AlphaQuads {
-    fn new(levels: &[MipLevel], sampler: Sampler) -> Self {
+    fn new(texture: &Texture) -> Self {
+        let sampler = texture.sampler;
         let mut firsts = [0; MAX_LEVELS.next_power_of_two()];
         let mut quads = Vec::new();
         let side = |texels: i32, wrap: Wrap| if wrap == Wrap::MirroredRepeat { texels * 2 + 1 } else { texels + 1 };
-        for (level, first) in levels.iter().zip(&mut firsts) {
+        for (level, first) in texture.levels.iter().zip(&mut firsts) {
+            let texels = texture.level_texels(level);
             *first = quads.len() as u32;
             let (width, height) = (level.width as i32, level.height as i32);
             let row = |y: i32| wrap_texel(y, height, sampler.wrap_v) * width as usize;
             let column = |x: i32| wrap_texel(x, width, sampler.wrap_u);
             for y in 0..side(height, sampler.wrap_v) {
                 let (top, bottom) = (row(y - 1), row(y));
-                let alpha = |row: usize, x: i32| level.texels[row + column(x)][3];
+                let alpha = |row: usize, x: i32| texels[row + column(x)][3];
                 quads.extend(
                     (0..side(width, sampler.wrap_u))
                         .map(|x| [alpha(top, x - 1), alpha(top, x), alpha(bottom, x - 1), alpha(bottom, x)]),
@@ -310,8 +332,8 @@ fn wrap_texel(i: i32, size: i32, wrap: Wrap) -> usize {
     i as usize
 }
 
-/// The next smaller level, each side half rounded down; `None` below 1 x 1.
-fn half(level: &MipLevel) -> Option<MipLevel> {
+/// Appends the texels of the level below the last one, each side half rounded down; `None` below 1 x 1.
+fn push_half(level: &MipLevel, texels: &mut Vec<[u8; 4]>) -> Option<MipLevel> {
     if level.width == 1 && level.height == 1 {
         return None;
     }
@@ -319,14 +341,15 @@ fn half(level: &MipLevel) -> Option<MipLevel> {
     let columns = box_weights(level.width, width);
     let rows = box_weights(level.height, height);
     let decoder = &*DECODER;
-    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    let first_above = level.first_texel as usize;
+    let first_texel = texels.len() as u32;
     for row in &rows {
         for column in &columns {
             let (mut weighted, mut plain, mut alpha) = (Vec4::ZERO, Vec4::ZERO, 0.0);
             for &(y, weight_y) in row {
                 for &(x, weight_x) in column {
                     let weight = weight_x * weight_y;
-                    let texel = decoder.decode(level.texels[y as usize * level.width as usize + x as usize]);
+                    let texel = decoder.decode(texels[first_above + y as usize * level.width as usize + x as usize]);
                     plain += texel * weight;
                     weighted += texel * (weight * texel.w);
                     alpha += weight * texel.w;
@@ -341,7 +364,7 @@ fn half(level: &MipLevel) -> Option<MipLevel> {
             ]);
         }
     }
-    Some(MipLevel { width, height, texels })
+    Some(MipLevel { width, height, first_texel })
 }
 
 /// For each texel of a side halved from `from` to `to`, the texels it covers and the share of each.
@@ -374,13 +397,13 @@ mod tests {
         let texture = checker(Sampler::default());
         assert_eq!(texture.levels().len(), 2);
         // Half of linear white is sRGB 188, not 128.
-        assert_eq!(texture.levels()[1].texels, [[188, 188, 188, 255]]);
+        assert_eq!(texture.level_texels(&texture.levels()[1]), [[188, 188, 188, 255]]);
     }
 
     #[test]
     fn transparent_texels_do_not_bleed_into_mips() {
         let texture = Texture::new(2, 1, vec![[200, 0, 0, 255], [0, 255, 0, 0]], Sampler::default()).unwrap();
-        assert_eq!(texture.levels()[1].texels, [[200, 0, 0, 128]]);
+        assert_eq!(texture.level_texels(&texture.levels()[1]), [[200, 0, 0, 128]]);
     }
 
     #[test]
@@ -388,7 +411,7 @@ mod tests {
         let texels = vec![[0, 0, 0, 255], [0, 0, 0, 255], [255, 255, 255, 255]];
         let texture = Texture::new(3, 1, texels, Sampler::default()).unwrap();
         let third = srgb8_from_linear(1.0 / 3.0);
-        assert_eq!(texture.levels()[1].texels, [[third, third, third, 255]]);
+        assert_eq!(texture.level_texels(&texture.levels()[1]), [[third, third, third, 255]]);
     }
 
     #[test]

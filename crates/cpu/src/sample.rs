@@ -7,7 +7,7 @@ use fearless_simd::{
 };
 use glam::Vec2;
 use pellucid_core::Texture;
-use pellucid_core::texture::{Filter, MipLevel, TexelValues, Wrap};
+use pellucid_core::texture::{Filter, TexelValues, Wrap};
 
 /// Coordinates sampled at a time.
 const LANES: usize = 8;
@@ -133,11 +133,10 @@ fn log2<S: Simd>(simd: S, value: f32x8<S>) -> f32x8<S> {
 
 /// The four texels around each of eight coordinates, each on a level of its own.
 struct Footprints<'a> {
-    levels: &'a [MipLevel],
+    texels: &'a [[u8; 4]],
     /// Whether no texel is translucent.
     is_opaque: bool,
-    level: [i32; LANES],
-    /// Places in the level: top left, top right, bottom left, bottom right.
+    /// Places among the texels: top left, top right, bottom left, bottom right.
     places: [[i32; LANES]; 4],
     /// The shares of the texels to the right and below.
     across: [f32; LANES],
@@ -151,11 +150,15 @@ impl<'a> Footprints<'a> {
         let [width, height] = level_size(simd, texture, level);
         let (left, right, across) = texel_pair(simd, at.u, width, sampler.wrap_u);
         let (top, bottom, down) = texel_pair(simd, at.v, height, sampler.wrap_v);
-        let (top, bottom) = (top * width, bottom * width);
+        let mut firsts: [i32; LANES] = level.into();
+        for first in &mut firsts {
+            *first = texture.levels()[*first as usize].first_texel as i32;
+        }
+        let first = i32x8::load_array(simd, firsts);
+        let (top, bottom) = (top * width + first, bottom * width + first);
         Self {
-            levels: texture.levels(),
+            texels: texture.texels(),
             is_opaque: texture.is_opaque(),
-            level: level.into(),
             places: [(top + left).into(), (top + right).into(), (bottom + left).into(), (bottom + right).into()],
             across: across.into(),
             down: down.into(),
@@ -166,7 +169,7 @@ impl<'a> Footprints<'a> {
     /// values stays in registers.
     #[inline(always)]
     fn color<S: Simd, const OPAQUE: bool>(&self, simd: S, values: &TexelValues, lane: usize) -> f32x4<S> {
-        let texels: &[[u8; 4]] = &self.levels[self.level[lane] as usize].texels;
+        let texels = self.texels;
         let top_left = texel::<S, OPAQUE>(simd, values, texels[self.places[0][lane] as usize]);
         let top_right = texel::<S, OPAQUE>(simd, values, texels[self.places[1][lane] as usize]);
         let bottom_left = texel::<S, OPAQUE>(simd, values, texels[self.places[2][lane] as usize]);
@@ -189,7 +192,13 @@ impl<'a> Footprints<'a> {
         for (lane, color) in colors.iter_mut().enumerate().take(count) {
             *color = self.color::<S, OPAQUE>(simd, values, lane).into();
         }
-        channels(simd, colors.as_flattened())
+        Self::channels::<S, OPAQUE>(simd, &colors)
+    }
+
+    #[inline(always)]
+    fn channels<S: Simd, const OPAQUE: bool>(simd: S, colors: &[[f32; 4]; LANES]) -> [f32x8<S>; 4] {
+        let [red, green, blue, alpha] = channels(simd, colors.as_flattened());
+        [red, green, blue, if OPAQUE { f32x8::splat(simd, 1.0) } else { alpha }]
     }
 
     /// The colours of the first `count`, each so far on the way to that on another level.
@@ -217,16 +226,16 @@ impl<'a> Footprints<'a> {
             let far = far.color::<S, OPAQUE>(simd, values, lane);
             colors[lane] = (near + (far - near) * fraction[lane]).into();
         }
-        channels(simd, colors.as_flattened())
+        Self::channels::<S, OPAQUE>(simd, &colors)
     }
 }
 
-/// Linear light and alpha of a texel.
+/// Linear light and alpha of a texel; no alpha where all are opaque.
 #[inline(always)]
 fn texel<S: Simd, const OPAQUE: bool>(simd: S, values: &TexelValues, texel: [u8; 4]) -> f32x4<S> {
     // Through a number, so that there is one load instead of four.
     let [red, green, blue, alpha] = u32::from_le_bytes(texel).to_le_bytes().map(usize::from);
-    let alpha = if OPAQUE { 1.0 } else { values.alpha[alpha] };
+    let alpha = if OPAQUE { 0.0 } else { values.alpha[alpha] };
     f32x4::load_array(simd, [values.linear[red], values.linear[green], values.linear[blue], alpha])
 }
 

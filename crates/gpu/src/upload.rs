@@ -141,7 +141,7 @@ fn upload_texture(gpu: &Context, texture: &Texture) -> Result<wgpu::Texture, Gpu
         view_formats: &[],
     })?;
     for (layer, levels) in (0..).zip([full_size, smaller]) {
-        atlas::write(gpu, &uploaded, 0, layer, levels);
+        atlas::write(gpu, &uploaded, 0, layer, texture, levels);
     }
     Ok(uploaded)
 }

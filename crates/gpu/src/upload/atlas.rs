@@ -84,8 +84,8 @@ impl AtlasLayout {
         })?;
         for (place, texture) in self.places.iter().zip(textures) {
             let (full_size, smaller) = texture.levels().split_at(1);
-            write(gpu, &atlas, place.full_size, place.pages & 0xffff, full_size);
-            write(gpu, &atlas, place.smaller, place.pages >> 16, smaller);
+            write(gpu, &atlas, place.full_size, place.pages & 0xffff, texture, full_size);
+            write(gpu, &atlas, place.smaller, place.pages >> 16, texture, smaller);
         }
         Ok(atlas)
     }
@@ -97,8 +97,15 @@ fn size_of(levels: &[MipLevel]) -> [u32; 2] {
     [width, levels.iter().map(|level| level.height).sum::<u32>().max(1)]
 }
 
-/// Writes levels one under the other from a place on, with x in the lower half of it and y in the upper.
-pub(super) fn write(gpu: &Context, array: &wgpu::Texture, place: u32, page: u32, levels: &[MipLevel]) {
+/// Writes levels of a texture one under the other from a place on, with x in the lower half of it and y in the upper.
+pub(super) fn write(
+    gpu: &Context,
+    array: &wgpu::Texture,
+    place: u32,
+    page: u32,
+    texture: &Texture,
+    levels: &[MipLevel],
+) {
     let mut y = place >> 16;
     for level in levels {
         gpu.queue.write_texture(
@@ -108,7 +115,7 @@ pub(super) fn write(gpu: &Context, array: &wgpu::Texture, place: u32, page: u32,
                 origin: wgpu::Origin3d { x: place & 0xffff, y, z: page },
                 aspect: wgpu::TextureAspect::All,
             },
-            level.texels.as_flattened(),
+            texture.level_texels(level).as_flattened(),
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width * 4), rows_per_image: None },
             wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
         );

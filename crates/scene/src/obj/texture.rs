@@ -108,7 +108,7 @@ fn read(name: &str, assets: &dyn Assets, warnings: &mut Warnings) -> Result<Opti
     match decode(&bytes, Sampler { mip: None, ..Sampler::default() }) {
         Ok(texture) => {
             let level = &texture.levels()[0];
-            Ok(Some(Picture { width: level.width, height: level.height, texels: level.texels.clone() }))
+            Ok(Some(Picture { width: level.width, height: level.height, texels: texture.texels().to_vec() }))
         }
         Err(detail) => {
             warnings.add(format!("the texture '{name}' {detail}"));
