@@ -249,12 +249,20 @@ impl<'a, S: Simd> RowFragments<'a, S> {
                     light(simd, [axis(0), axis(1), axis(2)])
                 }
             };
-            let kept = mask32x8::from_bitmask(simd, bits);
             let room = fragments.room(LANES as usize);
-            let samples: u32x8<S> = (self.lanes + sample as i32).compress(kept).bitcast();
-            samples.store_slice(room.samples);
-            depth.compress(kept).store_slice(room.depths);
-            light.compress(kept).store_slice(room.lights);
+            let samples: u32x8<S> = (self.lanes + sample as i32).bitcast();
+            // Triangles are convex: a row has gaps only where something hides it or covers it twice.
+            let has_gaps = bits & (bits + 1) != 0;
+            if has_gaps {
+                let kept = mask32x8::from_bitmask(simd, bits);
+                samples.compress(kept).store_slice(room.samples);
+                depth.compress(kept).store_slice(room.depths);
+                light.compress(kept).store_slice(room.lights);
+            } else {
+                samples.store_slice(room.samples);
+                depth.store_slice(room.depths);
+                light.store_slice(room.lights);
+            }
             u32x8::splat(simd, source).store_slice(room.sources);
             u32x8::splat(simd, primitive).store_slice(room.primitives);
             fragments.advance(bits.count_ones() as usize);
