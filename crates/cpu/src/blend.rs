@@ -6,6 +6,7 @@ use pellucid_core::composite::Composite;
 
 use crate::fragments::COLOR;
 use crate::order::{STRIP, Strip};
+use crate::sample::channels;
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
 /// Layers blended between two looks at whether anything behind them still counts.
@@ -78,20 +79,17 @@ impl TileCapture {
         let (lights, sources, colors) = self.fragments.lights_and_sources();
         for (i, row) in self.order.rows(strip).iter().enumerate() {
             let numbers = row.0.map(|key| key as u32 as usize);
-            let mut layer = [[0.0; STRIP]; 4];
-            for (lane, &number) in numbers.iter().enumerate() {
+            let mut layer = [[0.0; 4]; STRIP];
+            for (color, number) in layer.iter_mut().zip(numbers) {
                 let source = sources[number];
-                let color = if source & COLOR == 0 {
+                *color = if source & COLOR == 0 {
                     let (color, light) = (frame.palette[source as usize], lights[number]);
                     (color * Vec4::new(light, light, light, 1.0)).to_array()
                 } else {
                     colors[(source & !COLOR) as usize]
                 };
-                for (channel, value) in layer.iter_mut().zip(color) {
-                    channel[lane] = value;
-                }
             }
-            blended.under(layer.map(|channel| f32x8::load_array(simd, channel)));
+            blended.under(channels(simd, layer.as_flattened()));
             if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
                 break;
             }

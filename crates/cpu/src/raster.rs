@@ -226,7 +226,6 @@ impl<'a, S: Simd> RowFragments<'a, S> {
         let row = f64x8::splat(simd, self.depths.row(y));
         let dx = f64x8::splat(simd, self.depths.plane.dx);
         let [least, greatest] = self.depths.range;
-        let normal_row = self.normal.value + self.normal.dy * (self.top + y as i32) as f32;
         let mut mask = u64::from(mask);
         while mask != 0 {
             let x = mask.trailing_zeros();
@@ -245,7 +244,8 @@ impl<'a, S: Simd> RowFragments<'a, S> {
                 Some(light) => f32x8::splat(simd, light),
                 None => {
                     let columns: f32x8<S> = (self.lanes + (self.left + x as i32)).to_float();
-                    let axis = |i: usize| columns * self.normal.dx[i] + normal_row[i];
+                    let row = self.normal.value + self.normal.dy * (self.top + y as i32) as f32;
+                    let axis = |i: usize| columns * self.normal.dx[i] + row[i];
                     light(simd, [axis(0), axis(1), axis(2)])
                 }
             };
