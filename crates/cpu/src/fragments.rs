@@ -1,6 +1,6 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
-use fearless_simd::{Simd, SimdBase, f32x8, mask32x8, u32x8};
+use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8, mask32x8, u32x8};
 
 use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
@@ -202,6 +202,63 @@ impl Fragments {
             (*depth, *light, *source, *primitive) = (from.depth, from.light, from.draw + 1, from.primitive);
         }
         self.end += small.len();
+    }
+
+    /// Adds those of small triangles' fragments whose samples are among the `count` from `first` on, from which they are numbered
+    /// anew, and that lie not behind the depths in `hidden`.
+    #[inline(never)]
+    pub(crate) fn extend_within(
+        &mut self,
+        level: Level,
+        small: &[SmallFragment],
+        samples: &[u16],
+        within: [u32; 2],
+        hidden: Option<&[f32]>,
+    ) {
+        dispatch!(level, simd => self.extend_within_simd(simd, small, samples, within, hidden));
+    }
+
+    #[inline(always)]
+    fn extend_within_simd<S: Simd>(
+        &mut self,
+        simd: S,
+        small: &[SmallFragment],
+        samples: &[u16],
+        [first, count]: [u32; 2],
+        hidden: Option<&[f32]>,
+    ) {
+        let (vectors, rest) = small.as_chunks::<SHADED_LANES>();
+        let (vectors_of_samples, rest_of_samples) = samples.as_chunks::<SHADED_LANES>();
+        for (small, samples) in vectors.iter().zip(vectors_of_samples) {
+            let samples = u32x8::load_array(simd, samples.map(u32::from)) - first;
+            let depths = f32x8::load_array(simd, std::array::from_fn(|i| small[i].depth));
+            let mut kept = samples.simd_lt(count);
+            if let Some(hidden) = hidden {
+                let samples: [u32; SHADED_LANES] = samples.into();
+                let hidden = samples.map(|sample| hidden.get(sample as usize).copied().unwrap_or_default());
+                kept &= depths.simd_ge(f32x8::load_array(simd, hidden));
+            }
+            let bits = kept.to_bitmask();
+            if bits == 0 {
+                continue;
+            }
+            let room = self.room(SHADED_LANES);
+            samples.compress(kept).store_slice(room.samples);
+            depths.compress(kept).store_slice(room.depths);
+            let lights = f32x8::load_array(simd, std::array::from_fn(|i| small[i].light));
+            lights.compress(kept).store_slice(room.lights);
+            let sources = u32x8::load_array(simd, std::array::from_fn(|i| small[i].draw + 1));
+            sources.compress(kept).store_slice(room.sources);
+            let primitives = u32x8::load_array(simd, std::array::from_fn(|i| small[i].primitive));
+            primitives.compress(kept).store_slice(room.primitives);
+            self.advance(bits.count_ones() as usize);
+        }
+        for (fragment, &sample) in rest.iter().zip(rest_of_samples) {
+            let sample = u32::from(sample).wrapping_sub(first);
+            if sample < count && hidden.is_none_or(|hidden| fragment.depth >= hidden[sample as usize]) {
+                self.push(sample, fragment.depth, fragment.light, fragment.draw + 1, fragment.primitive);
+            }
+        }
     }
 
     pub(crate) fn len(&self) -> usize {

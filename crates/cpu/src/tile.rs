@@ -288,18 +288,8 @@ impl TileCapture {
             self.fragments.extend(small, samples);
             return;
         }
-        for (fragment, &sample) in small.iter().zip(samples) {
-            let Some(sample) = band.sample(sample) else { continue };
-            if fragment.depth >= self.opaque_depths[sample] {
-                self.fragments.push(
-                    sample as u32,
-                    fragment.depth,
-                    fragment.light,
-                    fragment.draw + 1,
-                    fragment.primitive,
-                );
-            }
-        }
+        let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
+        self.fragments.extend_within(frame.level, small, samples, [band.first, band.count], hidden);
     }
 
     #[inline(always)]
