@@ -87,6 +87,22 @@ fn bits_do_not_depend_on_the_simd_level() {
     }
 }
 
+/// 72 thousand fragments of small triangles in one tile: more than are captured at once.
+#[test]
+fn deep_tiles_of_small_triangles_equal_the_oracle() {
+    let scene = pellucid::load("@grids:layers=70,tessellation=10").unwrap().scene;
+    let view = View::of(&scene).size(57, 32).opacity(0.1);
+    let capture = oracle::capture(&scene, &view).unwrap();
+    assert!(capture.layers.fragments.len() > 57 * 32 * 65);
+    let renderer = Renderer::new();
+    let gathered = layers::gather(&renderer, &scene, &view).unwrap();
+    if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
+        panic!("{difference}");
+    }
+    let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, Resolve::Blend);
+    assert!(expected == renderer.render(&scene, &view, Resolve::Blend).unwrap().image);
+}
+
 /// Into the geometry, behind it, and along its planes: no panic, no pixel that is not a number, and still the oracle's
 /// layers.
 #[test]
