@@ -452,7 +452,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// A picture of the background, made by all threads.
 fn filled(view: &View) -> Image {
-    let background = view.background;
-    let pixels = (0..view.width as usize * view.height as usize).into_par_iter().with_min_len(1 << 15);
-    Image::from_pixels(view.width, view.height, pixels.map(|_| background).collect())
+    let count = view.width as usize * view.height as usize;
+    let pixels = rayon::iter::repeat_n(view.background, count).with_min_len(1 << 15);
+    Image::from_pixels(view.width, view.height, pixels.collect())
 }
