@@ -22,19 +22,25 @@ pub(crate) struct OnTexture<S: Simd> {
 }
 
 impl<S: Simd> OnTexture<S> {
-    /// The colours of the first `count`, channel by channel, as [`Texture::sample_scaled`].
+    /// The colours of the first `count`, channel by channel, as [`Texture::sample_scaled`]; alphas that are not wanted are 1.
     #[inline(always)]
-    pub(crate) fn sample(&self, simd: S, texture: &Texture, count: usize) -> [f32x8<S>; 4] {
+    pub(crate) fn sample(&self, simd: S, texture: &Texture, count: usize, wants_alpha: bool) -> [f32x8<S>; 4] {
         let Some(Levels { near, far }) = self.levels(simd, texture, count) else {
             let colors = sample_each(texture, [self.u.into(), self.v.into()], self.texels_squared.into(), count);
             return channels(simd, colors.as_flattened());
         };
         let near = Footprints::new(simd, texture, near, self);
+        let is_opaque = texture.is_opaque() || !wants_alpha;
         match far {
-            None => near.colors(simd, count),
+            None if is_opaque => near.colors::<S, true>(simd, count),
+            None => near.colors::<S, false>(simd, count),
             Some((far, fraction)) => {
                 let far = Footprints::new(simd, texture, far, self);
-                near.colors_between(simd, &far, fraction.into(), count)
+                if is_opaque {
+                    near.colors_between::<S, true>(simd, &far, fraction.into(), count)
+                } else {
+                    near.colors_between::<S, false>(simd, &far, fraction.into(), count)
+                }
             }
         }
     }
@@ -134,8 +140,6 @@ fn log2<S: Simd>(simd: S, value: f32x8<S>) -> f32x8<S> {
 /// The four texels around each of eight coordinates, each on a level of its own.
 struct Footprints<'a> {
     texels: &'a [[u8; 4]],
-    /// Whether no texel is translucent.
-    is_opaque: bool,
     /// Places among the texels: top left, top right, bottom left, bottom right.
     places: [[i32; LANES]; 4],
     /// The shares of the texels to the right and below.
@@ -158,7 +162,6 @@ impl<'a> Footprints<'a> {
         let (top, bottom) = (top * width + first, bottom * width + first);
         Self {
             texels: texture.texels(),
-            is_opaque: texture.is_opaque(),
             places: [(top + left).into(), (top + right).into(), (bottom + left).into(), (bottom + right).into()],
             across: across.into(),
             down: down.into(),
@@ -181,12 +184,7 @@ impl<'a> Footprints<'a> {
 
     /// The colours of the first `count`, channel by channel.
     #[inline(always)]
-    fn colors<S: Simd>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
-        if self.is_opaque { self.colors_of::<S, true>(simd, count) } else { self.colors_of::<S, false>(simd, count) }
-    }
-
-    #[inline(always)]
-    fn colors_of<S: Simd, const OPAQUE: bool>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
+    fn colors<S: Simd, const OPAQUE: bool>(&self, simd: S, count: usize) -> [f32x8<S>; 4] {
         let values = TexelValues::get();
         let mut colors = [[0.0; 4]; LANES];
         for (lane, color) in colors.iter_mut().enumerate().take(count) {
@@ -203,16 +201,7 @@ impl<'a> Footprints<'a> {
 
     /// The colours of the first `count`, each so far on the way to that on another level.
     #[inline(always)]
-    fn colors_between<S: Simd>(&self, simd: S, far: &Self, fraction: [f32; LANES], count: usize) -> [f32x8<S>; 4] {
-        if self.is_opaque {
-            self.colors_between_of::<S, true>(simd, far, fraction, count)
-        } else {
-            self.colors_between_of::<S, false>(simd, far, fraction, count)
-        }
-    }
-
-    #[inline(always)]
-    fn colors_between_of<S: Simd, const OPAQUE: bool>(
+    fn colors_between<S: Simd, const OPAQUE: bool>(
         &self,
         simd: S,
         far: &Self,

@@ -134,14 +134,14 @@ impl Unshaded {
     fn shade_simd<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
         let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
         fragments.make_room_after(LANES);
-        self.test_alphas(simd, draw, fragments);
+        let is_tested = draw.cutoff.is_some() && self.test_alphas(simd, draw, fragments);
         let end = fragments.end();
         fragments.make_room_for_colors(self.count + LANES);
         let mut kept = self.first;
         for start in (self.first..end).step_by(LANES) {
             let count = (end - start).min(LANES);
             let lights = f32x8::from_slice(simd, fragments.lights_from(start));
-            let (colors, passes) = self.lit_colors(simd, draw, start - self.first, lights, count);
+            let (colors, passes) = self.lit_colors(simd, draw, start - self.first, lights, count, is_tested);
             let Some(passes) = passes else {
                 let to = fragments.shaded(start, count);
                 (lanes + to.first_source).store_slice(to.sources);
@@ -164,13 +164,14 @@ impl Unshaded {
     }
 
     /// Leaves out what fails the alpha test, as far as the texture's alpha alone tells: of leaves most, and what is left out
-    /// needs no colour.
+    /// needs no colour. Returns whether all that is left passes.
     #[inline(always)]
-    fn test_alphas<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
-        let (Some(cutoff), Some((texture, _))) = (draw.cutoff, draw.texture) else { return };
+    fn test_alphas<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) -> bool {
+        let (Some(cutoff), Some((texture, _))) = (draw.cutoff, draw.texture) else { return false };
         if texture.is_opaque() || draw.mesh.colors().is_some() || draw.mesh.tex_coords().is_none() {
-            return;
+            return false;
         }
+        let mut all_tested = true;
         let end = fragments.end();
         let mut kept = self.first;
         for start in (self.first..end).step_by(LANES) {
@@ -179,6 +180,8 @@ impl Unshaded {
             if let Some(alphas) = self.on_texture(simd, start - self.first).alphas(simd, texture, count) {
                 let alpha = alphas * draw.material.base_color.w;
                 bits &= (!alpha.min(GREATEST_COLOR.w).simd_lt(cutoff)).to_bitmask();
+            } else {
+                all_tested = false;
             }
             let passes = mask32x8::from_bitmask(simd, bits);
             fragments.keep(simd, start, kept, passes);
@@ -191,6 +194,7 @@ impl Unshaded {
         }
         fragments.truncate(kept);
         self.count = kept - self.first;
+        all_tested
     }
 
     /// The colours of the vector of fragments from place `at` on, the first `count` of which are there: lit and
@@ -203,8 +207,12 @@ impl Unshaded {
         at: usize,
         light: f32x8<S>,
         count: usize,
+        is_tested: bool,
     ) -> ([f32x8<S>; 4], Option<mask32x8<S>>) {
         let base = draw.material.base_color.to_array();
+        // Whether anything depends on the texture's alpha.
+        let cutoff = draw.cutoff.filter(|_| !is_tested);
+        let wants_alpha = draw.blends || cutoff.is_some();
         let mut color = [f32x8::splat(simd, 0.0); 4];
         if draw.mesh.colors().is_some() {
             color = channels(simd, self.colors[at..at + LANES].as_flattened());
@@ -216,7 +224,7 @@ impl Unshaded {
         if let Some((texture, _)) = draw.texture
             && draw.mesh.tex_coords().is_some()
         {
-            let sampled = self.on_texture(simd, at).sample(simd, texture, count);
+            let sampled = self.on_texture(simd, at).sample(simd, texture, count, wants_alpha);
             for i in 0..4 {
                 color[i] *= sampled[i];
             }
@@ -226,7 +234,7 @@ impl Unshaded {
             let within = color[i].max(0.0).min(GREATEST_COLOR[i]);
             color[i] = is_nan.select(f32x8::splat(simd, base[i]), within);
         }
-        let passes = draw.cutoff.map(|cutoff| !color[3].simd_lt(cutoff));
+        let passes = cutoff.map(|cutoff| !color[3].simd_lt(cutoff));
         // As `Draw::premultiplied` and `lit`.
         let opacity = f32x8::splat(simd, draw.opacity);
         let alpha = if draw.blends { color[3].min(1.0) * opacity } else { opacity };
