@@ -1,7 +1,7 @@
 //! Random triangle soups, and cameras amid them.
 
 use glam::{Affine3A, Quat, Vec2, Vec3, Vec3Swizzles, Vec4};
-use pellucid::core::texture::{Sampler, Wrap};
+use pellucid::core::texture::{Filter, Sampler, Wrap};
 use pellucid::{AlphaMode, Camera, Instance, Material, Mesh, Projection, Scene, Texture};
 use proptest::prelude::*;
 
@@ -76,9 +76,11 @@ fn look() -> impl Strategy<Value = Look> {
 
 fn texture() -> impl Strategy<Value = Texture> {
     let wrap = || prop_oneof![2 => Just(Wrap::Repeat), 1 => Just(Wrap::MirroredRepeat), 1 => Just(Wrap::ClampToEdge)];
-    (wrap(), wrap()).prop_map(|(wrap_u, wrap_v)| {
+    let filter = || prop_oneof![3 => Just(Filter::Linear), 1 => Just(Filter::Nearest)];
+    let mip = prop_oneof![3 => Just(Some(Filter::Linear)), 1 => Just(Some(Filter::Nearest)), 1 => Just(None)];
+    (wrap(), wrap(), filter(), filter(), mip).prop_map(|(wrap_u, wrap_v, magnify, minify, mip)| {
         let texels = (0..63u8).map(|i| [i * 3, 255 - i * 2, 90, if i % 3 == 0 { 40 } else { 230 }]).collect();
-        Texture::new(9, 7, texels, Sampler { wrap_u, wrap_v, ..Sampler::default() }).unwrap()
+        Texture::new(9, 7, texels, Sampler { wrap_u, wrap_v, magnify, minify, mip }).unwrap()
     })
 }
 
