@@ -17,6 +17,9 @@ pub const MAX_TEXTURE_SIZE_PX: u32 = 16_384;
 /// Mip levels of the largest texture.
 const MAX_LEVELS: usize = MAX_TEXTURE_SIZE_PX.ilog2() as usize + 1;
 
+/// Most places of a texture of which the alphas around are gathered: they take 256 MiB.
+pub const MAX_ALPHA_QUADS: u64 = 1 << 26;
+
 /// What lies beyond the edge of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
@@ -68,7 +71,7 @@ impl Default for Sampler {
 }
 
 /// One mip level: RGBA, 8 bits a channel, sRGB-encoded colour, straight alpha.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MipLevel {
     /// Width in texels.
     pub width: u32,
@@ -91,7 +94,7 @@ pub struct Texture {
     texels: Vec<[u8; 4]>,
     is_opaque: bool,
     sampler: Sampler,
-    alpha_quads: OnceLock<AlphaQuads>,
+    alpha_quads: OnceLock<Option<AlphaQuads>>,
 }
 
 /// The alphas of the four texels around each place between texels side by side: what an alpha test needs of a level, in one
@@ -148,13 +151,12 @@ impl Texture {
         if texels.len() != width as usize * height as usize {
             return Err(Error::Texture(format!("{} texels for {width} x {height}", texels.len())));
         }
-        let (mut levels, mut texels) = (vec![MipLevel { width, height, first_texel: 0 }], texels);
-        if sampler.mip.is_some() {
-            // Each level has a quarter of the one above, or half if that is one texel wide.
-            texels.reserve_exact(if width.min(height) == 1 { texels.len() } else { texels.len() / 2 });
-            while let Some(smaller) = push_half(&levels[levels.len() - 1], &mut texels) {
-                levels.push(smaller);
-            }
+        let mut texels = texels;
+        let levels = levels(width, height, sampler.mip.is_some());
+        let texel_count: usize = levels.iter().map(MipLevel::texel_count).sum();
+        texels.reserve_exact(texel_count - texels.len());
+        for pair in levels.windows(2) {
+            push_half(&pair[0], &pair[1], &mut texels);
         }
         let is_opaque = texels.iter().all(|texel| texel[3] == u8::MAX);
         Ok(Self { levels, texels, is_opaque, sampler, alpha_quads: OnceLock::new() })
@@ -185,9 +187,10 @@ impl Texture {
         self.sampler
     }
 
-    /// The alphas around all places of all levels, which are gathered when first asked for.
-    pub fn alpha_quads(&self) -> &AlphaQuads {
-        self.alpha_quads.get_or_init(|| AlphaQuads::new(self))
+    /// The alphas around all places of all levels, which are gathered when first asked for; `None` if they are more than
+    /// [`MAX_ALPHA_QUADS`].
+    pub fn alpha_quads(&self) -> Option<&AlphaQuads> {
+        self.alpha_quads.get_or_init(|| AlphaQuads::new(self)).as_ref()
     }
 
     /// The colour at texture coordinate `uv`, linear light and straight alpha, for a pixel over which the coordinate
@@ -253,36 +256,46 @@ impl Texture {
 }
 
 impl AlphaQuads {
-    fn new(texture: &Texture) -> Self {
-        let sampler = texture.sampler;
+    fn new(texture: &Texture) -> Option<Self> {
+        let Sampler { wrap_u, wrap_v, .. } = texture.sampler;
+        let sides = |level: &MipLevel| [quads_along(level.width, wrap_u), quads_along(level.height, wrap_v)];
+        let count: u64 =
+            texture.levels.iter().map(sides).map(|[across, down]| u64::from(across) * u64::from(down)).sum();
+        if count > MAX_ALPHA_QUADS {
+            return None;
+        }
         let mut firsts = [0; MAX_LEVELS.next_power_of_two()];
-        let mut quads = Vec::new();
-        let side = |texels: i32, wrap: Wrap| if wrap == Wrap::MirroredRepeat { texels * 2 + 1 } else { texels + 1 };
+        let mut quads = Vec::with_capacity(count as usize);
         for (level, first) in texture.levels.iter().zip(&mut firsts) {
-            let texels = texture.level_texels(level);
             *first = quads.len() as u32;
-            let (width, height) = (level.width as i32, level.height as i32);
-            let row = |y: i32| wrap_texel(y, height, sampler.wrap_v) * width as usize;
-            let column = |x: i32| wrap_texel(x, width, sampler.wrap_u);
-            for y in 0..side(height, sampler.wrap_v) {
+            let [across, down] = sides(level);
+            let texels = texture.level_texels(level);
+            let row = |y: i32| wrap_texel(y, level.height as i32, wrap_v) * level.width as usize;
+            let column = |x: i32| wrap_texel(x, level.width as i32, wrap_u);
+            let alpha = |row: usize, x: i32| texels[row + column(x)][3];
+            for y in 0..down as i32 {
                 let (top, bottom) = (row(y - 1), row(y));
-                let alpha = |row: usize, x: i32| texels[row + column(x)][3];
                 quads.extend(
-                    (0..side(width, sampler.wrap_u))
+                    (0..across as i32)
                         .map(|x| [alpha(top, x - 1), alpha(top, x), alpha(bottom, x - 1), alpha(bottom, x)]),
                 );
             }
         }
-        Self { firsts, quads }
+        Some(Self { firsts, quads })
     }
 
-    /// A level's quad of this number. They lie row by row: from the one before the first texel to the one behind the last, of
-    /// mirrored textures behind the last of the mirror image.
+    /// A level's quad of this number. They lie row by row: from the one before the first texel to the one behind the last, or of
+    /// mirrored textures to the one behind the last of the mirror image.
     #[inline(always)]
     pub fn quad(&self, level: i32, number: i32) -> [u8; 4] {
         let first = self.firsts[level as usize % MAX_LEVELS.next_power_of_two()];
         self.quads[first as usize + number as usize]
     }
+}
+
+/// Quads along a side: from before the first texel to behind the last, of mirrored textures behind the last of the mirror image.
+fn quads_along(texels: u32, wrap: Wrap) -> u32 {
+    if wrap == Wrap::MirroredRepeat { texels * 2 + 1 } else { texels + 1 }
 }
 
 /// Base-2 logarithm of a number above 0, exact at powers of two and linear between them: the same bits on every machine
@@ -332,24 +345,34 @@ fn wrap_texel(i: i32, size: i32, wrap: Wrap) -> usize {
     i as usize
 }
 
-/// Appends the texels of the level below the last one, each side half rounded down; `None` below 1 x 1.
-fn push_half(level: &MipLevel, texels: &mut Vec<[u8; 4]>) -> Option<MipLevel> {
-    if level.width == 1 && level.height == 1 {
-        return None;
+/// The levels of a texture: the full size alone, or with it each side halved, rounded down, as long as one is longer than a texel.
+fn levels(width: u32, height: u32, is_mip_mapped: bool) -> Vec<MipLevel> {
+    let mut levels = vec![MipLevel { width, height, first_texel: 0 }];
+    let mut last = levels[0];
+    while is_mip_mapped && (last.width > 1 || last.height > 1) {
+        last = MipLevel {
+            width: (last.width / 2).max(1),
+            height: (last.height / 2).max(1),
+            first_texel: last.first_texel + last.width * last.height,
+        };
+        levels.push(last);
     }
-    let (width, height) = ((level.width / 2).max(1), (level.height / 2).max(1));
-    let columns = box_weights(level.width, width);
-    let rows = box_weights(level.height, height);
+    levels
+}
+
+/// Appends the texels of the level below the last one.
+fn push_half(level: &MipLevel, half: &MipLevel, texels: &mut Vec<[u8; 4]>) {
+    let columns = box_weights(level.width, half.width);
+    let rows = box_weights(level.height, half.height);
     let decoder = &*DECODER;
-    let first_above = level.first_texel as usize;
-    let first_texel = texels.len() as u32;
+    let first = level.first_texel as usize;
     for row in &rows {
         for column in &columns {
             let (mut weighted, mut plain, mut alpha) = (Vec4::ZERO, Vec4::ZERO, 0.0);
             for &(y, weight_y) in row {
                 for &(x, weight_x) in column {
                     let weight = weight_x * weight_y;
-                    let texel = decoder.decode(texels[first_above + y as usize * level.width as usize + x as usize]);
+                    let texel = decoder.decode(texels[first + y as usize * level.width as usize + x as usize]);
                     plain += texel * weight;
                     weighted += texel * (weight * texel.w);
                     alpha += weight * texel.w;
@@ -364,7 +387,6 @@ fn push_half(level: &MipLevel, texels: &mut Vec<[u8; 4]>) -> Option<MipLevel> {
             ]);
         }
     }
-    Some(MipLevel { width, height, first_texel })
 }
 
 /// For each texel of a side halved from `from` to `to`, the texels it covers and the share of each.

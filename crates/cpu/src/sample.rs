@@ -7,7 +7,7 @@ use fearless_simd::{
 };
 use glam::Vec2;
 use pellucid_core::Texture;
-use pellucid_core::texture::{Filter, TexelValues, Wrap};
+use pellucid_core::texture::{AlphaQuads, Filter, TexelValues, Wrap};
 
 /// Coordinates sampled at a time.
 const LANES: usize = 8;
@@ -45,13 +45,13 @@ impl<S: Simd> OnTexture<S> {
         }
     }
 
-    /// Alphas alone of the first `count`; `None` where filters are mixed, or coordinates have no value.
+    /// Alphas alone of the first `count`, which `quads` holds; `None` where filters are mixed, or coordinates have no value.
     #[inline(always)]
-    pub(crate) fn alphas(&self, simd: S, texture: &Texture, count: usize) -> Option<f32x8<S>> {
+    pub(crate) fn alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, count: usize) -> Option<f32x8<S>> {
         let Levels { near, far } = self.levels(simd, texture, count)?;
-        let near = self.level_alphas(simd, texture, near, count);
+        let near = self.level_alphas(simd, texture, quads, near, count);
         let Some((far, fraction)) = far else { return Some(near) };
-        Some(near + (self.level_alphas(simd, texture, far, count) - near) * fraction)
+        Some(near + (self.level_alphas(simd, texture, quads, far, count) - near) * fraction)
     }
 
     /// Which levels the first `count` see; `None` where filters are mixed, or coordinates have no value.
@@ -83,7 +83,7 @@ impl<S: Simd> OnTexture<S> {
 
     /// The alphas of the first `count` on a level each.
     #[inline(always)]
-    fn level_alphas(&self, simd: S, texture: &Texture, level: i32x8<S>, count: usize) -> f32x8<S> {
+    fn level_alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, level: i32x8<S>, count: usize) -> f32x8<S> {
         let sampler = texture.sampler();
         let [width, height] = level_size(simd, texture, level);
         let (left, across) = texel_before(self.u, width, sampler.wrap_u);
@@ -91,7 +91,6 @@ impl<S: Simd> OnTexture<S> {
         let columns = if sampler.wrap_u == Wrap::MirroredRepeat { width * 2 } else { width };
         let numbers: [i32; LANES] = ((top + 1) * (columns + 1) + (left + 1)).into();
         let level: [i32; LANES] = level.into();
-        let quads = texture.alpha_quads();
         let mut found = [0; LANES];
         for lane in 0..count {
             found[lane] = u32::from_le_bytes(quads.quad(level[lane], numbers[lane]));
@@ -190,11 +189,11 @@ impl<'a> Footprints<'a> {
         for (lane, color) in colors.iter_mut().enumerate().take(count) {
             *color = self.color::<S, OPAQUE>(simd, values, lane).into();
         }
-        Self::channels::<S, OPAQUE>(simd, &colors)
+        Self::channels_of::<S, OPAQUE>(simd, &colors)
     }
 
     #[inline(always)]
-    fn channels<S: Simd, const OPAQUE: bool>(simd: S, colors: &[[f32; 4]; LANES]) -> [f32x8<S>; 4] {
+    fn channels_of<S: Simd, const OPAQUE: bool>(simd: S, colors: &[[f32; 4]; LANES]) -> [f32x8<S>; 4] {
         let [red, green, blue, alpha] = channels(simd, colors.as_flattened());
         [red, green, blue, if OPAQUE { f32x8::splat(simd, 1.0) } else { alpha }]
     }
@@ -215,7 +214,7 @@ impl<'a> Footprints<'a> {
             let far = far.color::<S, OPAQUE>(simd, values, lane);
             colors[lane] = (near + (far - near) * fraction[lane]).into();
         }
-        Self::channels::<S, OPAQUE>(simd, &colors)
+        Self::channels_of::<S, OPAQUE>(simd, &colors)
     }
 }
 

@@ -171,13 +171,14 @@ impl Unshaded {
         if texture.is_opaque() || draw.mesh.colors().is_some() || draw.mesh.tex_coords().is_none() {
             return false;
         }
+        let Some(quads) = texture.alpha_quads() else { return false };
         let mut all_tested = true;
         let end = fragments.end();
         let mut kept = self.first;
         for start in (self.first..end).step_by(LANES) {
             let count = (end - start).min(LANES);
             let mut bits = (1 << count) - 1;
-            if let Some(alphas) = self.on_texture(simd, start - self.first).alphas(simd, texture, count) {
+            if let Some(alphas) = self.on_texture(simd, start - self.first).alphas(simd, texture, quads, count) {
                 let alpha = alphas * draw.material.base_color.w;
                 bits &= (!alpha.min(GREATEST_COLOR.w).simd_lt(cutoff)).to_bitmask();
             } else {
