@@ -141,7 +141,7 @@ impl Texture {
     ///
     /// # Errors
     /// [`Error::Texture`] if a side is 0 or above [`MAX_TEXTURE_SIZE_PX`], or the data do not fit the size.
-    pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>, sampler: Sampler) -> Result<Self, Error> {
+    pub fn new(width: u32, height: u32, mut texels: Vec<[u8; 4]>, sampler: Sampler) -> Result<Self, Error> {
         let sides = 1..=MAX_TEXTURE_SIZE_PX;
         if !sides.contains(&width) || !sides.contains(&height) {
             return Err(Error::Texture(format!(
@@ -151,7 +151,6 @@ impl Texture {
         if texels.len() != width as usize * height as usize {
             return Err(Error::Texture(format!("{} texels for {width} x {height}", texels.len())));
         }
-        let mut texels = texels;
         let levels = levels(width, height, sampler.mip.is_some());
         let texel_count: usize = levels.iter().map(MipLevel::texel_count).sum();
         texels.reserve_exact(texel_count - texels.len());

@@ -4,6 +4,7 @@ use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8, mask32x8, 
 
 use crate::shade::SHADED_LANES;
 use crate::small::SmallFragment;
+use crate::tile::Band;
 
 /// Where the colour of a fragment comes from: 0 for none, the number of a draw plus 1, in whose palette colour it is lit,
 /// or with this bit set a place among the colours of those that are lit already.
@@ -204,18 +205,17 @@ impl Fragments {
         self.end += small.len();
     }
 
-    /// Adds those of small triangles' fragments whose samples are among the `count` from `first` on, from which they are numbered
-    /// anew, and that lie not behind the depths in `hidden`.
+    /// Adds those of small triangles' fragments that lie in a band and not behind the depths in `hidden`.
     #[inline(never)]
     pub(crate) fn extend_within(
         &mut self,
         level: Level,
         small: &[SmallFragment],
         samples: &[u16],
-        within: [u32; 2],
+        band: Band,
         hidden: Option<&[f32]>,
     ) {
-        dispatch!(level, simd => self.extend_within_simd(simd, small, samples, within, hidden));
+        dispatch!(level, simd => self.extend_within_simd(simd, small, samples, band, hidden));
     }
 
     #[inline(always)]
@@ -224,15 +224,15 @@ impl Fragments {
         simd: S,
         small: &[SmallFragment],
         samples: &[u16],
-        [first, count]: [u32; 2],
+        band: Band,
         hidden: Option<&[f32]>,
     ) {
         let (vectors, rest) = small.as_chunks::<SHADED_LANES>();
         let (vectors_of_samples, rest_of_samples) = samples.as_chunks::<SHADED_LANES>();
         for (small, samples) in vectors.iter().zip(vectors_of_samples) {
-            let samples = u32x8::load_array(simd, samples.map(u32::from)) - first;
+            let samples = u32x8::load_array(simd, samples.map(u32::from)) - band.first;
             let depths = f32x8::load_array(simd, std::array::from_fn(|i| small[i].depth));
-            let mut kept = samples.simd_lt(count);
+            let mut kept = samples.simd_lt(band.count);
             if let Some(hidden) = hidden {
                 let samples: [u32; SHADED_LANES] = samples.into();
                 let hidden = samples.map(|sample| hidden.get(sample as usize).copied().unwrap_or_default());
@@ -254,9 +254,9 @@ impl Fragments {
             self.advance(bits.count_ones() as usize);
         }
         for (fragment, &sample) in rest.iter().zip(rest_of_samples) {
-            let sample = u32::from(sample).wrapping_sub(first);
-            if sample < count && hidden.is_none_or(|hidden| fragment.depth >= hidden[sample as usize]) {
-                self.push(sample, fragment.depth, fragment.light, fragment.draw + 1, fragment.primitive);
+            let Some(sample) = band.sample(sample) else { continue };
+            if hidden.is_none_or(|hidden| fragment.depth >= hidden[sample]) {
+                self.push(sample as u32, fragment.depth, fragment.light, fragment.draw + 1, fragment.primitive);
             }
         }
     }

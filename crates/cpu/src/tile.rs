@@ -64,15 +64,15 @@ impl FragmentCounts {
 
 /// Samples of a tile that are captured in one go.
 #[derive(Debug, Clone, Copy)]
-struct Band {
-    first: u32,
-    count: u32,
+pub(crate) struct Band {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
 }
 
 impl Band {
     /// A sample of the tile as one of the band.
     #[inline(always)]
-    fn sample(self, sample: u16) -> Option<usize> {
+    pub(crate) fn sample(self, sample: u16) -> Option<usize> {
         let sample = u32::from(sample).wrapping_sub(self.first);
         (sample < self.count).then_some(sample as usize)
     }
@@ -289,7 +289,7 @@ impl TileCapture {
             return;
         }
         let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
-        self.fragments.extend_within(frame.level, small, samples, [band.first, band.count], hidden);
+        self.fragments.extend_within(frame.level, small, samples, band, hidden);
     }
 
     #[inline(always)]
