@@ -70,6 +70,19 @@ fn class(count: u32) -> usize {
     (32 + (log - 5) * 8 + (count >> (log - 3) & 7)) as usize
 }
 
+/// Puts the keys of fragments into rows: where a sample's next one goes, `next` tells. A function of its own, so that its
+/// counters stay in registers.
+#[inline(never)]
+fn put_down(samples: &[u32], depths: &[f32], next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
+    for (before, (&sample, &depth)) in samples[1..].iter().zip(&depths[1..]).enumerate() {
+        let place = &mut next[sample as usize % TILE_SAMPLES];
+        let (row, lane) = (*place as usize / STRIP, *place as usize % STRIP);
+        // Number 0 is no fragment.
+        rows[row].0[lane] = u64::from(depth.to_bits()) << 32 | (before as u64 + 1);
+        *place += STRIP as u32;
+    }
+}
+
 impl Order {
     /// Orders the fragments of a tile.
     pub(crate) fn sort(&mut self, level: Level, fragments: &Fragments) -> FragmentCounts {
@@ -91,12 +104,7 @@ impl Order {
         let rows = &mut self.keys[..row_count];
         rows.fill(Row::default());
         let next: &mut [u32; TILE_SAMPLES] = (&mut self.firsts[..]).try_into().unwrap_or_else(|_| unreachable!());
-        for (number, (&sample, &depth)) in samples.iter().zip(depths).enumerate().skip(1) {
-            let place = &mut next[sample as usize % TILE_SAMPLES];
-            let (row, lane) = (*place as usize / STRIP, *place as usize % STRIP);
-            rows[row].0[lane] = u64::from(depth.to_bits()) << 32 | number as u64;
-            *place += STRIP as u32;
-        }
+        put_down(samples, depths, next, rows);
         self.last.begin(fragments.len() + 1);
         dispatch!(level, simd => self.sort_strips(simd));
         totals

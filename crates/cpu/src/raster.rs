@@ -87,24 +87,27 @@ pub(crate) fn cover<S: Simd>(
     }
     let lanes = i32x8::from_slice(simd, &[0, 1, 2, 3, 4, 5, 6, 7]);
     let [a, b, c] = edges;
-    let (ramp_a, ramp_b, ramp_c) = (lanes * a.dx, lanes * b.dx, lanes * c.dx);
+    let first = |edge: &TileEdge| edge.value + edge.dy * top + edge.dx * left;
+    let (first_a, first_b, first_c) = (first(&a), first(&b), first(&c));
+    let (mut row_a, mut row_b, mut row_c) = (lanes * a.dx + first_a, lanes * b.dx + first_b, lanes * c.dx + first_c);
+    let zero = i32x8::splat(simd, 0);
     let mut any = 0;
-    for (y, row) in (top..).zip(rows) {
-        let mut value_a = a.value + a.dy * y + a.dx * left;
-        let mut value_b = b.value + b.dy * y + b.dx * left;
-        let mut value_c = c.value + c.dy * y + c.dx * left;
+    for row in rows {
+        let (mut value_a, mut value_b, mut value_c) = (row_a, row_b, row_c);
         let mut mask = 0u64;
         let mut x = left;
         while x <= right {
-            let inside = (ramp_a + value_a) | (ramp_b + value_b) | (ramp_c + value_c);
-            mask |= inside.simd_ge(i32x8::splat(simd, 0)).to_bitmask() << x;
+            mask |= (value_a | value_b | value_c).simd_ge(zero).to_bitmask() << x;
             x += LANES;
-            value_a = value_a.wrapping_add(a.dx * LANES);
-            value_b = value_b.wrapping_add(b.dx * LANES);
-            value_c = value_c.wrapping_add(c.dx * LANES);
+            value_a += a.dx * LANES;
+            value_b += b.dx * LANES;
+            value_c += c.dx * LANES;
         }
         *row = mask as u32 & columns;
         any |= *row;
+        row_a += a.dy;
+        row_b += b.dy;
+        row_c += c.dy;
     }
     any != 0
 }

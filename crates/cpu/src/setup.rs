@@ -193,24 +193,19 @@ impl Chunk {
             } else {
                 let mut lanes = sight.small;
                 while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
+                    let lane = lanes.trailing_zeros() as usize % LANES;
                     lanes &= lanes - 1;
-                    let blocks = sight.blocks(lane);
-                    if !sight.has_one_block()
-                        && blocks.iter().map(|(_, covered)| covered.count_ones()).sum::<u32>() > MOST_FRAGMENTS
-                    {
+                    if sight.maybe_many >> lane & 1 != 0 && sight.covered_count(lane) > MOST_FRAGMENTS {
                         records |= 1 << lane;
                         continue;
                     }
                     let [a, b, c] = triangles[lane];
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
                     small::fetch(corners, draw, vertices);
-                    for (block, covered) in blocks {
+                    for number in 0..sight.block_count {
+                        let (block, covered) = sight.block(number, lane);
                         if covered != 0 && small.push(first + lane, corners, block, covered) {
                             small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
-                        }
-                        if sight.has_one_block() {
-                            break;
                         }
                     }
                 }

@@ -5,7 +5,7 @@ use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
 use crate::bin::TileGrid;
-use crate::small::{BLOCK_PX, LANES, load_pairs};
+use crate::small::{BLOCK_PX, LANES, MOST_FRAGMENTS, load_pairs};
 use crate::transform::OUTSIDE;
 
 /// A triangle less than so many subpixels wide and high is small: at most two blocks a side. Edge values then fit 32 bits
@@ -17,24 +17,30 @@ const BLOCKS: usize = 4;
 
 /// What is known of sixteen triangles; a bit for each in a mask.
 pub(crate) struct Sight {
-    /// Small ones that cover samples, unless those are all beside the window.
+    /// Small ones that cover samples.
     pub(crate) small: u32,
+    /// Small ones that may have more than [`MOST_FRAGMENTS`], in more than one block.
+    pub(crate) maybe_many: u32,
     /// Others that may be in sight: large ones, and those with a corner that cannot be projected.
     pub(crate) others: u32,
     /// Small ones that run counter-clockwise on the screen.
     pub(crate) swapped: u32,
     /// First sample of the small ones' bounds, in the window.
-    pub(crate) left: [i32; LANES],
-    pub(crate) top: [i32; LANES],
-    width: [i32; LANES],
-    height: [i32; LANES],
-    /// Whether a small one has samples to the right of the window or below it.
-    leaves_window: bool,
-    /// Blocks side by side, and one above another.
-    block_columns: usize,
-    block_rows: usize,
-    /// Of each block the upper and the lower half, a bit for each sample.
-    halves: [[[i32; LANES]; 2]; BLOCKS],
+    left: [i32; LANES],
+    top: [i32; LANES],
+    /// Blocks that one of the small ones reaches, from each one's first sample on.
+    pub(crate) block_count: usize,
+    blocks: [Block; BLOCKS],
+}
+
+/// A block of samples at the same place in the bounds of all sixteen triangles.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    /// From the first sample of the bounds.
+    across: i32,
+    down: i32,
+    /// Which samples of the upper and the lower half each triangle covers, a bit for each.
+    halves: [[i32; LANES]; 2],
 }
 
 impl Sight {
@@ -61,91 +67,89 @@ impl Sight {
         if draw.culls_back_faces {
             small &= if draw.mirrored { !swapped } else { swapped };
         }
+        // Whether a small one has samples to the right of the window or below it.
+        let leaves_window = (leaves_window & small).any_true();
         let mut sight = Self {
             small: small.to_bitmask() as u32,
+            maybe_many: 0,
             others: others.to_bitmask() as u32,
             swapped: swapped.to_bitmask() as u32,
             left: left.into(),
             top: top.into(),
-            width: (right - left).into(),
-            height: (bottom - top).into(),
-            leaves_window: (leaves_window & small).any_true(),
-            block_columns: 0,
-            block_rows: 0,
-            halves: [[[0; LANES]; 2]; BLOCKS],
+            block_count: 0,
+            blocks: [Block::default(); BLOCKS],
         };
         if sight.small == 0 {
             return sight;
         }
         let (bx, cx) = (swapped.select(cx, bx), swapped.select(bx, cx));
         let (by, cy) = (swapped.select(cy, by), swapped.select(by, cy));
-        let columns = small.select(right - left, zero).reduce_max() + 1;
-        let rows = small.select(bottom - top, zero).reduce_max() + 1;
+        let (width, height) = (right - left + 1, bottom - top + 1);
+        let columns = small.select(width, zero).reduce_max();
+        let rows = small.select(height, zero).reduce_max();
         let (x, y) = ((left << 8) + center(0), (top << 8) + center(0));
         let edges =
             [edge((bx, by), (cx, cy), (x, y)), edge((cx, cy), (ax, ay), (x, y)), edge((ax, ay), (bx, by), (x, y))];
-        (sight.block_columns, sight.block_rows) = (block_count(columns), block_count(rows));
         let mut any = zero;
-        for block_row in 0..sight.block_rows {
-            for block_column in 0..sight.block_columns {
-                let (across, down) = (block_column as i32 * BLOCK_PX, block_row as i32 * BLOCK_PX);
+        for down in (0..rows).step_by(BLOCK_PX as usize) {
+            for across in (0..columns).step_by(BLOCK_PX as usize) {
                 let size = [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)];
-                let [low, high] = cover_block(simd, &edges, [across, down], size);
-                any = any | low | high;
-                sight.halves[block_row * 2 + block_column] = [low.into(), high.into()];
+                let mut halves = cover_block(simd, &edges, [across, down], size);
+                if leaves_window {
+                    // Beyond the bounds there are no samples, but beyond the window there may be.
+                    halves = within(simd, halves, width - across, height - down);
+                }
+                any = any | halves[0] | halves[1];
+                sight.blocks[sight.block_count] = Block { across, down, halves: halves.map(Into::into) };
+                sight.block_count += 1;
             }
         }
         small &= !any.simd_eq(0);
         sight.small = small.to_bitmask() as u32;
+        if sight.block_count > 1 {
+            sight.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
+        }
         sight
     }
 
-    /// The blocks that a small triangle reaches, row by row: the first sample of each, and which of its samples are
-    /// covered and in the window, a bit for each.
+    /// A block's first sample in the bounds of a triangle, and which of its samples that covers, row by row.
     #[inline(always)]
-    pub(crate) fn blocks(&self, lane: usize) -> [([i32; 2], u64); BLOCKS] {
-        let mut blocks = [([0; 2], 0); BLOCKS];
-        for block_row in 0..self.block_rows {
-            for block_column in 0..self.block_columns {
-                let (across, down) = (block_column as i32 * BLOCK_PX, block_row as i32 * BLOCK_PX);
-                let [low, high] = &self.halves[block_row * 2 + block_column];
-                let covered = u64::from(low[lane] as u32) | u64::from(high[lane] as u32) << 32;
-                // Beyond the bounds there are no samples, but beyond the window there may be.
-                let mut in_window = u64::MAX;
-                if self.leaves_window {
-                    let (columns, rows) = (self.width[lane] - across, self.height[lane] - down);
-                    in_window = columns_mask(columns) & rows_mask(rows);
-                }
-                let first = [self.left[lane] + across, self.top[lane] + down];
-                blocks[block_row * 2 + block_column] = (first, covered & in_window);
-            }
-        }
-        blocks
+    pub(crate) fn block(&self, number: usize, lane: usize) -> ([i32; 2], u64) {
+        let Block { across, down, halves: [low, high] } = &self.blocks[number % BLOCKS];
+        let covered = u64::from(low[lane] as u32) | u64::from(high[lane] as u32) << 32;
+        ([self.left[lane] + across, self.top[lane] + down], covered)
     }
 
-    /// Whether no triangle reaches more than one block.
-    #[inline(always)]
-    pub(crate) fn has_one_block(&self) -> bool {
-        self.block_columns * self.block_rows == 1
+    /// How many samples a small triangle covers.
+    pub(crate) fn covered_count(&self, lane: usize) -> u32 {
+        (0..self.block_count).map(|number| self.block(number, lane).1.count_ones()).sum()
     }
 }
 
-/// Blocks that it takes for so many samples.
+/// Of the samples of a block those in the first so many columns and rows.
 #[inline(always)]
-fn block_count(samples: i32) -> usize {
-    1 + usize::from(samples > BLOCK_PX)
+fn within<S: Simd>(simd: S, halves: [i32x16<S>; 2], columns: i32x16<S>, rows: i32x16<S>) -> [i32x16<S>; 2] {
+    let [low, high]: [[i32; LANES]; 2] = halves.map(Into::into);
+    let (columns, rows): ([i32; LANES], [i32; LANES]) = (columns.into(), rows.into());
+    let (mut low_within, mut high_within) = ([0; LANES], [0; LANES]);
+    for lane in 0..LANES {
+        let mask = columns_mask(columns[lane]) & rows_mask(rows[lane]);
+        low_within[lane] = low[lane] & mask as i32;
+        high_within[lane] = high[lane] & (mask >> 32) as i32;
+    }
+    [i32x16::load_array(simd, low_within), i32x16::load_array(simd, high_within)]
 }
 
-/// The first `last + 1` columns of a block.
+/// The first so many columns of a block.
 #[inline(always)]
-fn columns_mask(last: i32) -> u64 {
-    if last < 0 { 0 } else { (0xFF >> (7 - last.min(7))) * 0x0101_0101_0101_0101 }
+fn columns_mask(count: i32) -> u64 {
+    if count <= 0 { 0 } else { (0xFF >> (BLOCK_PX - count.min(BLOCK_PX))) * 0x0101_0101_0101_0101 }
 }
 
-/// The first `last + 1` rows of a block.
+/// The first so many rows of a block.
 #[inline(always)]
-fn rows_mask(last: i32) -> u64 {
-    if last < 0 { 0 } else { u64::MAX >> (BLOCK_PX * (7 - last.min(7))) }
+fn rows_mask(count: i32) -> u64 {
+    if count <= 0 { 0 } else { u64::MAX >> (BLOCK_PX * (BLOCK_PX - count.min(BLOCK_PX))) }
 }
 
 /// The samples of a block that lie inside three edges: rows 0 to 3 and 4 to 7, a bit for each.

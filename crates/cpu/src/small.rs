@@ -161,7 +161,7 @@ impl SmallTriangles {
         let mut next = [0; LANES];
         let mut covered = [0; LANES];
         let mut primitives = [0; LANES];
-        let mut place = fragments.count;
+        let mut place = 0;
         // A bit for each lane that has fragments left.
         let mut active = 0u32;
         for lane in 0..triangle_count {
@@ -171,7 +171,7 @@ impl SmallTriangles {
             place += covered[lane].count_ones() as usize;
             active |= u32::from(covered[lane] != 0) << lane;
         }
-        fragments.make_room(place);
+        let (new_places, new_fragments) = fragments.add(place);
         let left = i32x16::load_array(simd, self.left);
         let top = i32x16::load_array(simd, self.top);
         let last = TILE_PX as i32 - 1;
@@ -204,8 +204,8 @@ impl SmallTriangles {
                 active &= !(u32::from(covered[lane] == 0) << lane);
                 let place = next[lane];
                 next[lane] += 1;
-                fragments.places[place] = places[lane] as u32;
-                fragments.fragments[place] = SmallFragment {
+                new_places[place] = places[lane] as u32;
+                new_fragments[place] = SmallFragment {
                     depth: depth[lane],
                     light: light[lane],
                     primitive: primitives[lane],
@@ -213,7 +213,6 @@ impl SmallTriangles {
                 };
             }
         }
-        fragments.count = place;
     }
 }
 
@@ -358,13 +357,17 @@ pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element;
 }
 
 impl NewFragments {
+    /// Adds so many: their places and they themselves, to be written.
     #[inline(always)]
-    fn make_room(&mut self, count: usize) {
-        if self.places.len() < count {
-            let room = count.next_power_of_two().max(1024);
+    fn add(&mut self, count: usize) -> (&mut [u32], &mut [SmallFragment]) {
+        let first = self.count;
+        self.count += count;
+        if self.places.len() < self.count {
+            let room = self.count.next_power_of_two().max(1024);
             self.places.resize(room, 0);
             self.fragments.resize(room, SmallFragment::default());
         }
+        (&mut self.places[first..self.count], &mut self.fragments[first..self.count])
     }
 
     /// Bytes held.
@@ -404,14 +407,15 @@ impl SmallFragments {
         }
         // Each start moves to the next one's place while its fragments are put down ...
         let (mut last_tile, mut start) = (0, 0);
-        for (&place, &fragment) in places.iter().zip(fragments) {
+        let (sorted_samples, sorted_fragments) = (&mut self.samples[..count], &mut self.fragments[..count]);
+        for (&place, fragment) in places.iter().zip(fragments) {
             let tile = (place >> SAMPLE_BITS) as usize;
             if tile != last_tile {
                 self.starts[last_tile] = start as u32;
                 (last_tile, start) = (tile, self.starts[tile] as usize);
             }
-            self.samples[start] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
-            self.fragments[start] = fragment;
+            sorted_samples[start] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
+            sorted_fragments[start] = *fragment;
             start += 1;
         }
         self.starts[last_tile] = start as u32;
