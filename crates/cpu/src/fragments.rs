@@ -36,7 +36,7 @@ pub(crate) struct TileFragment {
     pub(crate) primitive: u32,
 }
 
-/// Where up to a vector of fragments can be put.
+/// Where fragments can be put.
 pub(crate) struct Room<'a> {
     pub(crate) samples: &'a mut [u32],
     pub(crate) depths: &'a mut [f32],

@@ -9,6 +9,7 @@
 //! contract's order key. Keys are positive and look like f64 numbers of the same order, and of those every SIMD level has
 //! maximum and minimum.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 
 use crate::fragments::Fragments;
@@ -32,8 +33,8 @@ pub(crate) struct Order {
 }
 
 /// A key of each of a strip's pixels. One cache line, so that no vector lies in two.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(align(64))]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub(crate) struct Row(pub(crate) [u64; STRIP]);
 
 /// Eight pixels: neighbours, or of about equally many fragments.
@@ -74,11 +75,11 @@ fn class(count: u32) -> usize {
 /// counters stay in registers.
 #[inline(never)]
 fn put_down(samples: &[u32], depths: &[f32], next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
+    let keys: &mut [u64] = bytemuck::cast_slice_mut(rows);
     for (before, (&sample, &depth)) in samples[1..].iter().zip(&depths[1..]).enumerate() {
         let place = &mut next[sample as usize % TILE_SAMPLES];
-        let (row, lane) = (*place as usize / STRIP, *place as usize % STRIP);
         // Number 0 is no fragment.
-        rows[row].0[lane] = u64::from(depth.to_bits()) << 32 | (before as u64 + 1);
+        keys[*place as usize] = u64::from(depth.to_bits()) << 32 | (before as u64 + 1);
         *place += STRIP as u32;
     }
 }

@@ -13,7 +13,7 @@ use pellucid_core::primitive::Fold;
 use pellucid_core::shading::NormalPlane;
 
 use crate::bin::{PixelRect, TILE_PX};
-use crate::fragments::Fragments;
+use crate::fragments::Room;
 use crate::simd::light;
 
 /// An edge seen from a tile: not negative inside.
@@ -215,7 +215,8 @@ impl<'a, S: Simd> RowFragments<'a, S> {
         }
     }
 
-    /// Adds the fragments at the samples `mask` of row `y` of the tile, unless they lie behind the depths in `hidden`.
+    /// Puts the fragments at the samples `mask` of row `y` of the tile into room for them after the first `count`, which it
+    /// counts on, unless they lie behind the depths in `hidden`.
     #[inline(always)]
     pub(crate) fn add(
         &self,
@@ -224,7 +225,8 @@ impl<'a, S: Simd> RowFragments<'a, S> {
         mask: u32,
         hidden: Option<&[f32]>,
         [source, primitive]: [u32; 2],
-        fragments: &mut Fragments,
+        room: &mut Room<'_>,
+        count: &mut usize,
     ) {
         let row = f64x8::splat(simd, self.depths.row(y));
         let dx = f64x8::splat(simd, self.depths.plane.dx);
@@ -252,23 +254,23 @@ impl<'a, S: Simd> RowFragments<'a, S> {
                     light(simd, [axis(0), axis(1), axis(2)])
                 }
             };
-            let room = fragments.room(LANES as usize);
+            let range = *count..*count + LANES as usize;
             let samples: u32x8<S> = (self.lanes + sample as i32).bitcast();
             // Triangles are convex: a row has gaps only where something hides it or covers it twice.
             let has_gaps = bits & (bits + 1) != 0;
             if has_gaps {
                 let kept = mask32x8::from_bitmask(simd, bits);
-                samples.compress(kept).store_slice(room.samples);
-                depth.compress(kept).store_slice(room.depths);
-                light.compress(kept).store_slice(room.lights);
+                samples.compress(kept).store_slice(&mut room.samples[range.clone()]);
+                depth.compress(kept).store_slice(&mut room.depths[range.clone()]);
+                light.compress(kept).store_slice(&mut room.lights[range.clone()]);
             } else {
-                samples.store_slice(room.samples);
-                depth.store_slice(room.depths);
-                light.store_slice(room.lights);
+                samples.store_slice(&mut room.samples[range.clone()]);
+                depth.store_slice(&mut room.depths[range.clone()]);
+                light.store_slice(&mut room.lights[range.clone()]);
             }
-            u32x8::splat(simd, source).store_slice(room.sources);
-            u32x8::splat(simd, primitive).store_slice(room.primitives);
-            fragments.advance(bits.count_ones() as usize);
+            u32x8::splat(simd, source).store_slice(&mut room.sources[range.clone()]);
+            u32x8::splat(simd, primitive).store_slice(&mut room.primitives[range.clone()]);
+            *count += bits.count_ones() as usize;
         }
     }
 }

@@ -318,10 +318,14 @@ impl TileCapture {
         let steady = !draw.lit || draw.mesh.normals().is_none();
         let rows = RowFragments::new(simd, &depths, &normal, steady);
         let first = self.fragments.end();
+        let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
+        let covered_rows = coverage.bottom + 1 - coverage.top;
+        let mut room = self.fragments.room(covered_rows * TILE_PX as usize + TILE_SLACK);
+        let mut count = 0;
         for y in coverage.top..=coverage.bottom {
-            let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
-            rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut self.fragments);
+            rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut room, &mut count);
         }
+        self.fragments.advance(count);
         if draw.varies() && self.fragments.end() > first {
             let piece = chunk.piece(record, triangle);
             let [anchor_x, anchor_y] = triangle.anchor_px();
