@@ -1,23 +1,18 @@
 //! Scenes whose picture is known beforehand.
 
+#[path = "common/flat_view.rs"]
+mod flat_view;
+
 use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::fragment::order_key;
-use pellucid::{Camera, Instance, Material, Mesh, Projection, Renderer, Resolve, Scene, Shading, Technique, View};
+use pellucid::{Instance, Material, Mesh, Renderer, Resolve, Scene, Shading, Technique, View};
+
+use flat_view::flat_view;
 
 const BOTH: [Technique; 2] = [Technique::Cpu, Technique::Oracle];
 
-/// Sees the square from -1 to 1 in x and y, from z = 10.
-fn flat_view(scene: &Scene) -> View {
-    let mut view = View::of(scene).size(24, 24);
-    view.shading = Shading::Unlit;
-    view.camera = Camera {
-        eye: Vec3::Z * 10.0,
-        target: Vec3::ZERO,
-        up: Vec3::Y,
-        projection: Projection::Orthographic { height: 2.0, near: 0.0, far: 20.0 },
-    };
-    view
-}
+/// Pixels a side.
+const SIDE: u32 = 24;
 
 fn quad(scene: &mut Scene, corners: [Vec3; 4], color: Vec4) {
     let mesh = scene.add_mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()).unwrap();
@@ -38,7 +33,7 @@ fn n_planes_of_alpha_a_leave_the_nth_power_of_the_background() {
             let z = ((i * 389) % count) as f32 / count as f32;
             square(&mut scene, z, Vec4::new(0.0, 0.0, 0.0, alpha));
         }
-        let view = flat_view(&scene).background(Vec4::new(1.0, 0.5, 0.25, 1.0));
+        let view = flat_view(&scene, SIDE, SIDE).background(Vec4::new(1.0, 0.5, 0.25, 1.0));
         let expected = Vec3::new(1.0, 0.5, 0.25) * (1.0 - alpha).powi(count);
         for technique in BOTH {
             let frame = Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap();
@@ -77,7 +72,7 @@ fn what_hardly_gets_through_is_seen_where_nothing_outshines_it() {
             scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
         };
         (0..layers).for_each(|number| add(&mut scene, number, front));
-        let view = flat_view(&scene);
+        let view = flat_view(&scene, SIDE, SIDE);
         let render = |scene: &Scene, technique| {
             Renderer::new().technique(technique).render(scene, &view, Resolve::Blend).unwrap().image
         };
@@ -98,7 +93,7 @@ fn of_coplanar_quads_the_later_is_in_front() {
         square(&mut scene, 0.3, first);
         square(&mut scene, 0.3, second);
         for technique in BOTH {
-            let view = flat_view(&scene);
+            let view = flat_view(&scene, SIDE, SIDE);
             let frame = Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap();
             assert!(frame.image.pixels().iter().all(|&pixel| pixel == second), "{technique}");
         }
@@ -120,7 +115,7 @@ fn cyclically_overlapping_bars_are_right_where_they_cross() {
         let half = across * 0.12;
         quad(&mut scene, [from - half, to - half, to + half, from + half], color);
     }
-    let view = flat_view(&scene).size(240, 240);
+    let view = flat_view(&scene, 240, 240);
     for technique in BOTH {
         let frame = Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap();
         let at = |position: Vec3| {
@@ -159,7 +154,7 @@ fn every_order_of_the_triangles_gives_the_same_bits() {
             let hue = i as f32 / 7.0;
             quad(&mut scene, quads[i], Vec4::new(hue, 1.0 - hue, 0.5, 0.4));
         }
-        let view = View { shading: Shading::Lit, ..flat_view(&scene) }.size(65, 47);
+        let view = View { shading: Shading::Lit, ..flat_view(&scene, 65, 47) };
         Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap().image
     };
     for technique in BOTH {
@@ -184,7 +179,7 @@ fn opaque_surfaces_hide_what_is_behind_but_not_what_is_level() {
     let material = scene.add_material(Material::opaque("wall", Vec3::X)).unwrap();
     scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
     for technique in BOTH {
-        let view = flat_view(&scene);
+        let view = flat_view(&scene, SIDE, SIDE);
         let frame = Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap();
         assert_eq!(frame.stats.max_depth_complexity, 1, "{technique}");
         assert!(frame.image.pixels().iter().all(|&pixel| pixel == Vec4::new(0.5, 0.5, 0.0, 1.0)), "{technique}");

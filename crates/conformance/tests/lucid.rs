@@ -2,17 +2,19 @@
 //! with the oracle in every case of the suite, at any budget and on the portability floor, stands in `gpu.rs`.
 
 mod common;
+#[path = "common/flat_view.rs"]
+mod flat_view;
 
 use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::oracle;
 use pellucid::gpu::{DepthFilter, GpuRenderer};
-use pellucid::{
-    Camera, Frame, Instance, Material, Mesh, Projection, Renderer, Resolve, Scene, Shading, Technique, View,
-};
+use pellucid::{Frame, Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, View};
 use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
 
 use common::gpu;
+use flat_view::flat_view;
 
+const BEHIND: Vec4 = Vec4::new(0.1, 0.2, 0.3, 1.0);
 const RED: Vec4 = Vec4::new(1.0, 0.0, 0.0, 1.0);
 
 fn render(gpu: &GpuRenderer, scene: &Scene, view: &View, resolve: Resolve) -> Frame {
@@ -88,19 +90,6 @@ fn a_threshold_leaves_pixels_and_says_so() {
     assert!(greatest > 0.0 && greatest <= 1.0 / 128.0, "{greatest}");
 }
 
-/// Sees the square from -1 to 1 in x and y, from z = 10.
-fn flat_view(scene: &Scene, width: u32, height: u32) -> View {
-    let mut view = View::of(scene).size(width, height).background(Vec4::new(0.1, 0.2, 0.3, 1.0));
-    view.shading = Shading::Unlit;
-    view.camera = Camera {
-        eye: Vec3::Z * 10.0,
-        target: Vec3::ZERO,
-        up: Vec3::Y,
-        projection: Projection::Orthographic { height: 2.0, near: 0.0, far: 20.0 },
-    };
-    view
-}
-
 fn scene_of(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add_mesh(Mesh::new(positions, triangles).unwrap()).unwrap();
@@ -139,7 +128,7 @@ fn scenes_at_the_limits_agree_with_the_oracle() {
         )
     };
     let flat = |scene: Scene, width, height| {
-        let view = flat_view(&scene, width, height);
+        let view = flat_view(&scene, width, height).background(BEHIND);
         prepared(scene, view)
     };
     let boxes = || pellucid::load("@boxes:n=3").unwrap().scene;
@@ -185,10 +174,10 @@ fn a_picture_of_33_million_pixels_is_whole() {
     let Some(gpu) = gpu(false) else { return };
     let corners = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
     let scene = scene_of(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    let view = flat_view(&scene, 7680, 4320);
+    let view = flat_view(&scene, 7680, 4320).background(BEHIND);
     let frame = render(&gpu, &scene, &view, Resolve::Blend);
     assert_eq!(frame.stats.fragments, 7680 * 4320);
-    let expected = Vec3::new(0.2, 0.5, 0.9) * 0.25 + Vec3::new(0.1, 0.2, 0.3) * 0.75;
+    let expected = Vec3::new(0.2, 0.5, 0.9) * 0.25 + BEHIND.truncate() * 0.75;
     let is_right = |pixel: &Vec4| (pixel.truncate() - expected).abs().max_element() < 1e-3;
     assert!(frame.image.pixels().iter().all(is_right), "{:?}", frame.image.pixels().iter().find(|p| !is_right(p)));
 }
@@ -259,8 +248,9 @@ fn real_scenes_agree_with_the_oracle_at_any_filter() {
         for (path, prepared) in &scenes {
             for check in [Check::Layers, Check::Picture(Resolve::Blend)] {
                 let comparison = prepared.run(check, &candidate).unwrap();
-                // Pixels of hundreds of surfaces are ambiguous more often than those of the suite.
-                if comparison.unexplained > 0 || comparison.covered == 0 {
+                // Of the layers of a pixel, hundreds of them, one often is ambiguous; the picture hides nothing in that.
+                let agrees = comparison.passes() || check == Check::Layers && comparison.unexplained == 0;
+                if !agrees || comparison.covered == 0 {
                     failures.push(format!("{path}, floor: {floor}, filter of {size}, {check}: {comparison:?}"));
                 }
             }
