@@ -3,19 +3,21 @@
 //! The plain renderer is what one would write first: triangles binned into tiles, each tile's triangles rasterized pixel by
 //! pixel, each pixel's fragments sorted and blended. It is exact, and runs on all cores, without SIMD and without light:
 //! each surface keeps its bare colour. So it does less for each fragment than the CPU renderer, which lights as usual. Both
-//! draw frames in turns, and before that their unlit pictures must be equal.
+//! draw frames in turns, and before that their unlit pictures must be equal; which tells coverage, not order, as all has one colour.
 
 mod common;
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use common::{Case, SCENES};
 use glam::Vec4;
 use pellucid::core::composite::Composite;
 use pellucid::core::fragment::order_key;
-use pellucid::core::pixel_grid::{ScreenTriangle, ScreenVertex, Viewport, center, depth_at, twice_signed_area};
+use pellucid::core::pixel_grid::{
+    SUBPIXELS, ScreenTriangle, ScreenVertex, Viewport, center, depth_at, twice_signed_area,
+};
 use pellucid::core::primitive::{Draw, draws, transform_point};
 use pellucid::core::view::Shading;
 use pellucid::{Image, Renderer, Resolve, Scene, View};
@@ -134,15 +136,17 @@ impl PlainRenderer {
     }
 
     fn transform(&mut self, draw: &Draw<'_>, viewport: &Viewport) -> Result<(), String> {
+        let any_outside = AtomicBool::new(false);
         let vertices = draw.mesh.positions().par_iter().with_min_len(4096).map(|&point| {
             let clip = transform_point(&draw.clip_from_mesh, point);
-            if viewport.outcode(clip) == 0 { viewport.project(clip) } else { ScreenVertex::default() }
+            if viewport.outcode(clip) == 0 {
+                return viewport.project(clip);
+            }
+            any_outside.store(true, Ordering::Relaxed);
+            ScreenVertex::default()
         });
         vertices.collect_into_vec(&mut self.vertices);
-        if self.vertices.contains(&ScreenVertex::default()) {
-            return Err("the plain renderer does not clip".into());
-        }
-        Ok(())
+        if any_outside.into_inner() { Err("the plain renderer does not clip".into()) } else { Ok(()) }
     }
 
     fn bin(&mut self, draw: &Draw<'_>) {
@@ -207,8 +211,8 @@ struct Bounds {
 impl Bounds {
     /// Those of the pixels whose centres lie in a triangle's bounding box; `None` if there are none.
     fn around(self, [a, b, c]: &[ScreenVertex; 3]) -> Option<Self> {
-        let first = |subpixels: i32| (subpixels + 127) >> 8;
-        let last = |subpixels: i32| (subpixels - 128) >> 8;
+        let first = |subpixels: i32| (subpixels + SUBPIXELS / 2 - 1).div_euclid(SUBPIXELS);
+        let last = |subpixels: i32| (subpixels - SUBPIXELS / 2).div_euclid(SUBPIXELS);
         let bounds = Self {
             left: first(a.x.min(b.x).min(c.x)).max(self.left),
             top: first(a.y.min(b.y).min(c.y)).max(self.top),
@@ -267,11 +271,11 @@ impl Scratch {
                     self.fragments.push((pixel as u32, order_key(depth, primitive)));
                 }
                 for (value, edge) in values.iter_mut().zip(&triangle.edges) {
-                    *value += edge.a * 256;
+                    *value += edge.a * i64::from(SUBPIXELS);
                 }
             }
             for (value, edge) in row_values.iter_mut().zip(&triangle.edges) {
-                *value += edge.b * 256;
+                *value += edge.b * i64::from(SUBPIXELS);
             }
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Micro-benchmarks tell what a byte, a fragment, a comparison and a layer cost at least: their loops do what no exact
 //! renderer can leave out, on data in the cache, without a decision. Then each step of whole frames stands beside its floor,
-//! and last come the SIMD levels, in turns: all but transform, as small triangles become fragments while they are set up.
+//! and last come the SIMD levels, in turns: with set-up, as small triangles become fragments there, and from raster alone.
 
 mod common;
 
@@ -57,39 +57,50 @@ fn main() {
             steps.join(" ")
         );
     }
-    println!("\nms from set-up to resolve by SIMD level, in turns, and times faster than scalar\n");
-    let mut gains = vec![0.0; simd::levels().len()];
-    for case in &cases {
-        let (scene, view) = case.load();
-        let medians = medians_by_level(&scene, &view, 9);
-        let columns: Vec<String> = medians
-            .iter()
-            .zip(&mut gains)
-            .map(|((name, ms), gain)| {
-                *gain += (medians[0].1 / ms).ln();
-                format!("{name} {ms:.1} ({:.2}x)", medians[0].1 / ms)
-            })
-            .collect();
-        println!("{:<18} {}", case.name, columns.join("  "));
-    }
-    let columns: Vec<String> = simd::levels()
+    let all_medians: Vec<_> = cases
         .iter()
-        .zip(gains)
-        .map(|((name, _), gain)| format!("{name} {:.2}x", (gain / cases.len() as f64).exp()))
+        .map(|case| {
+            let (scene, view) = case.load();
+            (case.name, medians_by_level(&scene, &view, 9))
+        })
         .collect();
-    println!("{:<18} {}", "geometric mean", columns.join("  "));
+    for (count, steps) in ["set-up to resolve", "raster to resolve"].into_iter().enumerate() {
+        println!("\nms from {steps} by SIMD level, in turns, and times faster than scalar\n");
+        let mut gains = vec![0.0; simd::levels().len()];
+        for (name, medians) in &all_medians {
+            let scalar = medians[0].1[count];
+            let columns: Vec<String> = medians
+                .iter()
+                .zip(&mut gains)
+                .map(|((name, ms), gain)| {
+                    *gain += (scalar / ms[count]).ln();
+                    format!("{name} {:.1} ({:.2}x)", ms[count], scalar / ms[count])
+                })
+                .collect();
+            println!("{name:<18} {}", columns.join("  "));
+        }
+        let columns: Vec<String> = simd::levels()
+            .iter()
+            .zip(gains)
+            .map(|((name, _), gain)| format!("{name} {:.2}x", (gain / cases.len() as f64).exp()))
+            .collect();
+        println!("{:<18} {}", "geometric mean", columns.join("  "));
+    }
 }
 
-/// The median of so many frames at each SIMD level, without the transform, after one that allocates.
-fn medians_by_level(scene: &Scene, view: &View, frames: usize) -> Vec<(&'static str, f64)> {
+/// The medians of so many frames at each SIMD level, after one that allocates: from set-up to resolve, and from raster.
+fn medians_by_level(scene: &Scene, view: &View, frames: usize) -> Vec<(&'static str, [f64; 2])> {
     let renderers = simd::levels().into_iter().map(|(name, level)| (name, CpuRenderer::new(0).level(level)));
-    let mut levels: Vec<_> = renderers.map(|(name, renderer)| (name, renderer, Vec::new())).collect();
+    let mut levels: Vec<_> =
+        renderers.map(|(name, renderer)| (name, renderer, [const { Vec::<f64>::new() }; 2])).collect();
     for round in 0..=frames {
         for (_, renderer, all_ms) in &mut levels {
             if let Ok(frame) = renderer.render(scene, view, Resolve::Blend)
                 && round > 0
             {
-                all_ms.push(frame.stats.steps[1..].iter().map(|step| step.ms).sum());
+                for (all_ms, first) in all_ms.iter_mut().zip(1..) {
+                    all_ms.push(frame.stats.steps[first..].iter().map(|step| step.ms).sum());
+                }
             }
         }
     }
@@ -97,7 +108,7 @@ fn medians_by_level(scene: &Scene, view: &View, frames: usize) -> Vec<(&'static 
         all_ms.sort_by(f64::total_cmp);
         all_ms.get(all_ms.len() / 2).copied().unwrap_or(f64::NAN)
     };
-    levels.into_iter().map(|(name, _, all_ms)| (name, median(all_ms))).collect()
+    levels.into_iter().map(|(name, _, all_ms)| (name, all_ms.map(median))).collect()
 }
 
 impl Peaks {
