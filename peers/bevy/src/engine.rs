@@ -16,7 +16,7 @@ use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 use bevy::render::render_resource::{
     AsBindGroup, PollType, RenderPipelineDescriptor, SpecializedMeshPipelineError, TextureFormat, TextureUsages,
 };
-use bevy::render::renderer::RenderDevice;
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy::shader::ShaderRef;
 
@@ -57,7 +57,7 @@ pub(crate) struct Engine {
 }
 
 impl Engine {
-    /// Of the first instance of a scene. `lists`: how many fragments of a pixel are sorted, and how many a pixel has on average;
+    /// Of the first mesh of a scene, where it is, in the colour of the first material. `lists`: how many fragments of a pixel are sorted, and how many a pixel has on average;
     /// without, they are blended as they come.
     pub(crate) fn new(scene: &pellucid::Scene, view: &pellucid::View, lists: Option<(u32, f32)>) -> Self {
         let mut app = App::new();
@@ -74,7 +74,8 @@ impl Engine {
 
         let world = app.world_mut();
         let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh(&scene.meshes()[0]));
-        let color = LinearRgba::new(0.2, 0.4, 0.6, view.opacity);
+        let [r, g, b, alpha] = scene.materials()[0].base_color.to_array();
+        let color = LinearRgba::new(r, g, b, alpha * view.opacity);
         let material = world.resource_mut::<Assets<Bare>>().add(Bare { color });
         world.spawn((Mesh3d(mesh), MeshMaterial3d(material), NoFrustumCulling));
         let mut image = Image::new_target_texture(view.width, view.height, TextureFormat::Rgba8UnormSrgb, None);
@@ -106,6 +107,11 @@ impl Engine {
         let start = Instant::now();
         self.app.update();
         start.elapsed().as_secs_f64() * 1e3
+    }
+
+    /// The name of the device it draws on.
+    pub(crate) fn adapter(&self) -> &str {
+        &self.app.world().resource::<RenderAdapterInfo>().name
     }
 
     /// How many pixels are not background, as soon as any are.

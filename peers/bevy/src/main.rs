@@ -3,8 +3,7 @@
 //! Real scenes are taken as by the benchmarks of `pellucid` (`PELLUCID_SCENES`), without textures: one mesh, one colour. Bevy draws it
 //! with a bare material, Pellucid lights it. Both get the same triangles, camera, picture of 1280 x 720 and device. They take
 //! turns of two frames, each waited for and not read back, of which the second counts, as the first finds the caches full of
-//! another's data.
-//! Printed are medians, and how many times as long as the fastest of Pellucid's on that device Bevy's lists take.
+//! another's data. Printed are medians, and how many times as long as the fastest of Pellucid's on that device Bevy's lists take.
 //!
 //! Bevy is given lists long enough for all fragments and sorts as many as the deepest pixel has, so that it drops and
 //! merges none. It keeps 8 bits of alpha and 24 of depth, and 9 of each channel. A frame of it is whatever `App::update` does.
@@ -29,14 +28,20 @@ const ON_GPU: [Technique; 5] =
     [Technique::Alpha, Technique::Linear, Technique::List, Technique::Pages, Technique::Lucid];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("Milliseconds a frame; in brackets Bevy's lists over the fastest exact technique on the GPU");
+    let cases = common::wanted(SCENES);
+    if cases.is_empty() {
+        return Err(format!("no scene has such a name; there are {}", SCENES.map(|case| case.name).join(", ")).into());
+    }
+    println!("Milliseconds a frame on {};", open()?.context().name());
+    println!("in brackets Bevy's lists over the fastest exact technique on the GPU");
     let [alpha, linear, list, pages, lucid] = ON_GPU.map(|technique| technique.to_string());
     let names = ["fragments", "deepest", "Bevy, alpha", "Bevy, lists", &alpha, &linear, &list, &pages, &lucid, "cpu"];
     print_row("scene", names);
-    for case in common::wanted(SCENES) {
-        measure(&case)?;
-    }
-    Ok(())
+    cases.iter().try_for_each(measure)
+}
+
+fn open() -> Result<GpuRenderer, pellucid::gpu::GpuError> {
+    GpuRenderer::new(&ContextOptions { allow_software: true, ..Default::default() })
 }
 
 fn print_row(scene: &str, cells: [&str; 10]) {
@@ -66,7 +71,10 @@ fn measure(case: &Case) -> Result<(), Box<dyn std::error::Error>> {
 
     let mut renderers = vec![cpu];
     for technique in ON_GPU {
-        let gpu = GpuRenderer::new(&ContextOptions { allow_software: true, ..Default::default() })?;
+        let gpu = open()?;
+        if !gpu.context().name().starts_with(lists.adapter()) {
+            return Err(format!("Bevy draws on {}, Pellucid on {}", lists.adapter(), gpu.context().name()).into());
+        }
         renderers.push(Renderer::new().technique(technique).gpu(gpu));
     }
     let mut times = vec![Vec::new(); renderers.len() + 2];
@@ -91,7 +99,9 @@ fn measure(case: &Case) -> Result<(), Box<dyn std::error::Error>> {
     let (fragments, deepest) = (frame.stats.fragments.to_string(), deepest.to_string());
     let unsorted = format!("{bevy_unsorted:.1}");
     let cells = [&fragments, &deepest, &unsorted, &lists, &alpha, &linear, &list, &pages, &lucid, &cpu];
-    print_row(case.name, cells.map(String::as_str));
+    // A built-in scene may stand in for a real one.
+    let source = case.source();
+    print_row(if source.starts_with('@') { &source } else { case.name }, cells.map(String::as_str));
     Ok(())
 }
 
