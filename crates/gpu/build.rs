@@ -75,14 +75,13 @@ fn main() {
             continue;
         }
         for (technique, technique_source) in &techniques {
-            // Not all have to be sorted.
-            let can_sort = technique_source.contains("fn store(") || technique_source.contains("fn store_key(");
+            // What is sorted is a reference to a fragment, where it cannot be moved itself. Not all have to be sorted.
+            let by_reference = technique_source.contains("var fragments: texture_2d_array");
+            let can_sort = by_reference || technique_source.contains("fn store(");
             if technique_source.contains("fn fragment_count(") && (stem != "sort" || can_sort) {
                 // Random access to the fragments of a pixel, which not every structure has.
                 let random_access = technique_source.contains("fn slot_at(");
-                // What is sorted is a reference to a fragment, where it cannot be moved itself.
-                let by_key = technique_source.contains("fn load_key(");
-                let features = [("random_access", random_access), ("by_key", by_key), ("sorts", can_sort)];
+                let features = [("random_access", random_access), ("by_reference", by_reference), ("sorts", can_sort)];
                 let name = format!("{stem}_{technique}").to_uppercase();
                 linked.insert(name, compile(&path("pass", stem), Some(path("technique", technique)), &features));
             }
@@ -113,7 +112,7 @@ fn main() {
     let lfb = || Some(path("technique", "linear"));
     linked.insert("LUCID_BLEND".to_owned(), compile(&path("technique::lucid", "blend"), lfb(), &[]));
     for (name, stem) in [("LUCID_SORT_WRONG", "sort"), ("LUCID_RESOLVE_WRONG", "resolve")] {
-        let features = [("random_access", true), ("by_key", false), ("sorts", true), ("by_pixel", true)];
+        let features = [("random_access", true), ("by_reference", true), ("sorts", true), ("by_pixel", true)];
         linked.insert(name.to_owned(), compile(&path("pass", stem), lfb(), &features));
     }
     for stem in ["raster", "shade", "collect", "sort", "output", "last"] {
@@ -169,7 +168,7 @@ fn link(folder: &str, stem: &str) -> String {
 /// Links with the LFB that has payloads of so many words.
 fn link_interface(folder: &str, stem: &str, words: u32, read_only: bool) -> String {
     let payload = |n| (["payload_1", "payload_2", "payload_3", "payload_4"][n as usize - 1], n == words);
-    let access = [("random_access", true), ("by_key", false), ("read_only", read_only)];
+    let access = [("random_access", true), ("by_reference", false), ("sorts", true), ("read_only", read_only)];
     let features: Vec<_> = access.into_iter().chain((1..=4).map(payload)).collect();
     compile(&path(folder, stem), Some(path("lfb", "stored")), &features)
 }

@@ -316,8 +316,8 @@ pub(crate) struct CaptureArgs {
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
     pub(crate) alpha_threshold: Option<String>,
 
-    /// Write all sorted fragments back before they are resolved (linear, list, pages, abuffer): pays only where they are
-    /// read more than once
+    /// Put all fragments in order in memory before they are resolved (linear, list, pages, abuffer): pays only where they
+    /// are read more than once
     #[arg(long)]
     pub(crate) presort: bool,
 

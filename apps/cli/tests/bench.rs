@@ -105,8 +105,8 @@ fn a_software_gpu_is_measured_if_asked_for_and_told_apart_from_exact() {
     assert_eq!((&exact["exact"], &exact["cut_pixels"]), (&true.into(), &0.into()));
     let (buffers, textures) = (of(2, "abuffer"), of(2, "abuffer (textures)"));
     assert_eq!((&buffers["storage"], &textures["storage"]), (&"buffer".into(), &"texture".into()));
-    // A fragment takes 20 bytes in textures, 16 in buffers.
-    assert!(textures["peak_bytes"].as_u64() > buffers["peak_bytes"].as_u64());
+    // Sorted in registers, fragments take as much in textures as in buffers; references to them would come on top.
+    assert!(textures["peak_bytes"].as_u64() >= buffers["peak_bytes"].as_u64());
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! Writes shaders that sort the fragments of a pixel in registers, which WGSL has no loops or generics for: registers are
 //! named variables, and what is done to each is written out.
 //!
-//! The networks are Batcher's odd-even merge sort (1968; Knuth, The Art of Computer Programming 3, section 5.2.2): 19, 63 and
-//! 191 exchanges for 8, 16 and 32 fragments. For 8 there is none with fewer, for 16 the best known has 60, for 32 185.
+//! The networks are Batcher's odd-even merge sort (1968; Knuth, The Art of Computer Programming 3, section 5.2.2): 5, 19,
+//! 63 and 191 exchanges for 4, 8, 16 and 32 fragments. Up to 8 there is none with fewer, for 16 the best known has 60, for 32 185.
 
 use std::fmt::Write;
 
 /// Fragments that are sorted in registers at once. The last is a block of more, sorted in place.
-const SIZES: [usize; 3] = [8, 16, 32];
+const SIZES: [usize; 4] = [4, 8, 16, 32];
 
 /// The module `package::shared::networks`.
 ///
@@ -15,10 +15,9 @@ const SIZES: [usize; 3] = [8, 16, 32];
 pub(crate) fn module() -> String {
     let mut text = String::from(
         "import package::lfb::{load, next_slot};
-@if(sorts && !by_key) import package::lfb::{load as load_key, store as store_key};
-@if(sorts && by_key) import package::lfb::{load_key, store_key};
 import package::shared::fragment::{is_in_front, stored_color};
 import package::shared::resolve::{ResolveState, resolve_add_numbered};
+@if(sorts) import package::shared::sorted::{captured_key, store_key};
 
 const PLUS_ONE = vec4(0u, 0u, 1u, 0u);
 
@@ -57,13 +56,14 @@ fn write_resolve(text: &mut String, size: usize) -> std::fmt::Result {
     writeln!(text, "}}")
 }
 
-/// Adds `fn sort_N_in_place`, which sorts up to N fragments from a slot on where they are, and returns the slot behind them.
+/// Adds `fn sort_N_in_place`, which sorts up to N fragments from a slot on where they are, and returns the last slot.
 fn write_sort(text: &mut String, size: usize) -> std::fmt::Result {
     writeln!(text, "\n@if(sorts)\nfn sort_{size}_in_place(pixel: u32, first: u32, count: u32) -> u32 {{")?;
-    write_network(text, size, "load_key")?;
+    write_network(text, size, "captured_key")?;
     writeln!(text, "    slot = first;")?;
     for i in 0..size {
-        writeln!(text, "    if {i}u < count {{ store_key(slot, f{i} - PLUS_ONE); slot = next_slot(slot, pixel); }}")?;
+        let advance = advance(i);
+        writeln!(text, "    if {i}u < count {{{advance} store_key(slot, f{i} - PLUS_ONE); }}")?;
     }
     writeln!(text, "    return slot;\n}}")
 }
@@ -105,12 +105,18 @@ fn write_network(text: &mut String, size: usize, load: &str) -> std::fmt::Result
     writeln!(text, "    var slot = first;")?;
     for i in 0..size {
         writeln!(text, "    var f{i}: vec4<u32>;")?;
-        writeln!(text, "    if {i}u < count {{ f{i} = {load}(slot) + PLUS_ONE; slot = next_slot(slot, pixel); }}")?;
+        let advance = advance(i);
+        writeln!(text, "    if {i}u < count {{{advance} f{i} = {load}(slot) + PLUS_ONE; }}")?;
     }
     for (a, b) in exchanges(size) {
         writeln!(text, "    order(&f{a}, &f{b});")?;
     }
     Ok(())
+}
+
+/// From the slot of the fragment before to that of fragment `i`: nobody looks for one behind the last.
+fn advance(i: usize) -> &'static str {
+    if i == 0 { "" } else { " slot = next_slot(slot, pixel);" }
 }
 
 /// Pairs of places, the lower of which gets the nearer, one after another. `size` is a power of two.

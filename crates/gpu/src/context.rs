@@ -162,7 +162,7 @@ impl Context {
         }
     }
 
-    /// A texture of one picture's size.
+    /// A texture.
     pub(crate) fn texture(&self, descriptor: &wgpu::TextureDescriptor<'_>) -> Result<wgpu::Texture, GpuError> {
         let (label, size) = (descriptor.label.unwrap_or("a texture"), descriptor.size);
         let (side, limit) = (size.width.max(size.height), self.limits.max_texture_dimension_2d);
@@ -174,13 +174,23 @@ impl Context {
                 limit_name: "maxTextureDimension2D",
             });
         }
+        let (layers, limit) = (size.depth_or_array_layers, self.limits.max_texture_array_layers);
+        if layers > limit {
+            return Err(GpuError::Limit {
+                what: format!("the layers of {label}"),
+                size: layers.into(),
+                limit: limit.into(),
+                limit_name: "maxTextureArrayLayers",
+            });
+        }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let texture = self.device.create_texture(descriptor);
         match pollster::block_on(scope.pop()) {
             None => Ok(texture),
             Some(_) => {
                 let texel_bytes = descriptor.format.block_copy_size(None).unwrap_or(4);
-                let bytes = u64::from(size.width) * u64::from(size.height) * u64::from(texel_bytes);
+                let texels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+                let bytes = texels * u64::from(texel_bytes);
                 Err(GpuError::OutOfMemory { what: label.into(), bytes })
             }
         }

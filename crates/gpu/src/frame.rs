@@ -1,5 +1,7 @@
 //! One frame in the making: the per-frame half of everything.
 
+use std::cell::Cell;
+
 use glam::Vec4;
 use pellucid_core::fbuffer::Size;
 use pellucid_core::{Layers, Resolve, Scene, View};
@@ -27,6 +29,8 @@ pub(crate) struct Targets {
     /// Depth of the nearest opaque surface, 0 where there is none.
     pub(crate) opaque_depth: wgpu::Texture,
     pub(crate) opaque_depth_view: TextureView,
+    /// Whether nothing was drawn into both since they were cleared.
+    pub(crate) opaque_is_clear: Cell<bool>,
     /// The finished picture, linear light, premultiplied.
     pub(crate) picture: wgpu::Texture,
     pub(crate) picture_view: TextureView,
@@ -58,6 +62,7 @@ impl Targets {
             opaque_color,
             opaque_depth_view: view(&opaque_depth),
             opaque_depth,
+            opaque_is_clear: Cell::new(false),
             picture_view: view(&picture),
             picture,
         })
@@ -90,7 +95,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) rerenders: u32,
     /// Layers after which peeling stops.
     pub(crate) max_layers: Option<u32>,
-    /// Whether all sorted fragments are written back.
+    /// Whether all fragments are put in order in memory before the resolve.
     pub(crate) presort: bool,
     /// Pixels that had more.
     pub(crate) cut_pixels: u64,

@@ -58,6 +58,15 @@ struct Rendered {
     stats: Stats,
 }
 
+impl Kept {
+    /// Gives up what a frame that was not finished may have left half done.
+    fn forget(&mut self) {
+        self.memory.clear();
+        self.targets = None;
+        self.last = None;
+    }
+}
+
 impl GpuRenderer {
     /// Opens a device.
     ///
@@ -106,8 +115,9 @@ impl GpuRenderer {
         self
     }
 
-    /// The same renderer, writing all sorted fragments of an LFB back before it resolves them: for resolves that read them
-    /// more than once. Otherwise pixels with few fragments are sorted on the way to the resolve. The picture is the same.
+    /// The same renderer, putting all fragments of an LFB in order in memory, those in textures by reference, before it
+    /// resolves them: for resolves that read them more than once. Otherwise pixels with few fragments are sorted on the way to the
+    /// resolve. The picture is the same.
     #[must_use]
     pub fn presort(mut self, presort: bool) -> Self {
         self.presort = presort;
@@ -188,12 +198,15 @@ impl GpuRenderer {
         goal: Goal,
     ) -> Result<Rendered, GpuError> {
         view.check()?;
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept.lock().unwrap_or_else(|poisoned| {
+            self.kept.clear_poison();
+            let mut kept = poisoned.into_inner();
+            kept.forget();
+            kept
+        });
         let result = self.frame(&mut kept, scene, view, resolve, technique, goal);
         if result.is_err() {
-            // Whatever was half done is not trusted.
-            kept.memory.clear();
-            kept.last = None;
+            kept.forget();
         }
         result
     }

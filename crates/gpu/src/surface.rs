@@ -14,7 +14,7 @@ use self::pipelines::{Cull, PipelineKey};
 pub(crate) use self::pipelines::{SurfacePass, SurfacePipelines, depth_state};
 use crate::gpu_data::{DrawData, FrameData};
 use crate::upload::SceneUpload;
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// Long-lived: layouts, the vertex shader, and what stands in for a texture where there is none.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct SurfaceLayouts {
     pub(crate) texture: BindGroupLayout,
     vertex: wgpu::ShaderModule,
     no_texture: BindGroup,
-    /// In place of the opaque depth while that is being drawn.
+    /// In place of the opaque depth while that is being drawn, and where nothing is opaque.
     no_depth: wgpu::TextureView,
 }
 
@@ -47,6 +47,8 @@ pub(crate) struct SurfaceDraw {
 #[derive(Debug)]
 pub(crate) struct Surfaces<'a> {
     draws: Vec<SurfaceDraw>,
+    /// Whether any of them is opaque.
+    pub(crate) has_opaque: bool,
     scene: &'a SceneUpload,
     layouts: &'a SurfaceLayouts,
     groups: &'a DrawGroups,
@@ -64,9 +66,10 @@ pub(crate) struct DrawGroups {
     pub(crate) frame_data: wgpu::Buffer,
     instances: wgpu::Buffer,
     opaque_depth: wgpu::TextureView,
-    /// For the instances, before either [`Pass`].
-    opaque: Vec<BindGroup>,
-    transparent: Vec<BindGroup>,
+    /// For the instances: in front of opaque surfaces, and of nothing, which a single texel of depth 0 stands for, as there is
+    /// no other depth outside of a texture.
+    before_opaque: Vec<BindGroup>,
+    alone: Vec<BindGroup>,
 }
 
 /// Everything that a recording of surfaces depends on: as long as it is equal, the recording can be replayed.
@@ -119,7 +122,7 @@ impl SurfaceLayouts {
         let layout = |label, entries: &[_]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
-        let frame = layout("frame and draw", &[uniform(0), uniform(1), depth, storage_entry(3, all, true)]);
+        let frame = layout("frame and draw", &[uniform(0), uniform(1), depth]);
         let unshaded = ShaderStages::VERTEX | ShaderStages::COMPUTE;
         let scene = layout("scene", &[0, 1, 2].map(|binding| storage_entry(binding, unshaded, true)));
         let texels = wgpu::TextureSampleType::Float { filterable: false };
@@ -155,10 +158,7 @@ impl SurfaceLayouts {
 }
 
 fn texture_group(device: &wgpu::Device, layout: &BindGroupLayout, texture: &wgpu::Texture) -> BindGroup {
-    let view = texture.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2Array),
-        ..Default::default()
-    });
+    let view = table::view(texture);
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("texture"),
         layout,
@@ -229,9 +229,10 @@ impl<'a> Surfaces<'a> {
                     instance: i,
                 }
             })
-            .collect();
+            .collect::<Vec<_>>();
         gpu.queue.write_buffer(&groups.instances, 0, &bytes);
-        Ok(Self { draws: surface_draws, scene: upload, layouts, groups, data: all_data, dropped_triangles })
+        let has_opaque = surface_draws.iter().any(|draw| draw.pass == Pass::Opaque);
+        Ok(Self { draws: surface_draws, has_opaque, scene: upload, layouts, groups, data: all_data, dropped_triangles })
     }
 
     /// Group 1.
@@ -245,14 +246,22 @@ impl<'a> Surfaces<'a> {
             instance: draw.instance,
             mesh: draw.mesh,
             varies: draw.varies,
-            frame_group: &self.groups.transparent[draw.instance],
+            frame_group: &self.groups_of(Pass::Transparent)[draw.instance],
             texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
         })
     }
 
-    /// How many draws a part of the frame takes.
-    pub(crate) fn count(&self, pass: Pass) -> usize {
-        self.draws.iter().filter(|draw| draw.pass == pass).count()
+    /// Group 0 of all instances. Where nothing is opaque, nothing looks for it in memory.
+    fn groups_of(&self, pass: Pass) -> &[BindGroup] {
+        match pass {
+            Pass::Transparent if self.has_opaque => &self.groups.before_opaque,
+            _ => &self.groups.alone,
+        }
+    }
+
+    /// How many draws there are of transparent surfaces.
+    pub(crate) fn count_transparent(&self) -> usize {
+        self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).count()
     }
 
     /// Whether any draw of a part of the frame has to pass an alpha test.
@@ -264,7 +273,7 @@ impl<'a> Surfaces<'a> {
     pub(crate) fn structure(&self) -> Structure {
         Structure {
             scene: self.scene.bind_group.clone(),
-            groups: self.groups.transparent.first().cloned(),
+            groups: self.groups_of(Pass::Transparent).first().cloned(),
             draws: self.draws.iter().filter(|draw| draw.pass == Pass::Transparent).copied().collect(),
         }
     }
@@ -311,10 +320,7 @@ impl<'a> Surfaces<'a> {
         let pipelines = &pipelines.pipelines;
         let commands = draws().map(|draw| DrawCommand {
             pipeline: &pipelines[&key(draw)],
-            frame_group: match pass {
-                Pass::Opaque => &self.groups.opaque[draw.instance],
-                Pass::Transparent => &self.groups.transparent[draw.instance],
-            },
+            frame_group: &self.groups_of(pass)[draw.instance],
             texture: draw.texture.map_or(&self.layouts.no_texture, |texture| &self.scene.textures[texture]),
             corners: draw.corners,
             shared: (!draw.is_apart).then(|| {
@@ -328,9 +334,7 @@ impl<'a> Surfaces<'a> {
 
 /// Bytes from the data of one draw to the next.
 fn draw_stride(gpu: &Context) -> usize {
-    let limits = &gpu.limits;
-    let alignment = limits.min_storage_buffer_offset_alignment.max(limits.min_uniform_buffer_offset_alignment);
-    size_of::<DrawData>().next_multiple_of(alignment as usize)
+    size_of::<DrawData>().next_multiple_of(gpu.limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 impl DrawGroups {
@@ -356,10 +360,10 @@ impl DrawGroups {
         bytes: u64,
         opaque_depth: &wgpu::TextureView,
     ) -> Result<Self, GpuError> {
-        let (uniform, storage) = (wgpu::BufferUsages::UNIFORM, wgpu::BufferUsages::STORAGE);
+        let uniform = wgpu::BufferUsages::UNIFORM;
         let copied = wgpu::BufferUsages::COPY_DST;
         let frame_data = gpu.buffer("the frame", size_of::<FrameData>() as u64, uniform | copied)?;
-        let instances = gpu.buffer("the instances", bytes, uniform | storage | copied)?;
+        let instances = gpu.buffer("the instances", bytes, uniform | copied)?;
         let draw_data = |offset| {
             wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                 buffer: &instances,
@@ -375,14 +379,13 @@ impl DrawGroups {
                     wgpu::BindGroupEntry { binding: 0, resource: frame_data.as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 1, resource: draw_data(offset) },
                     wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(depth) },
-                    wgpu::BindGroupEntry { binding: 3, resource: draw_data(offset) },
                 ],
             })
         };
         let offsets = || (0..bytes).step_by(draw_stride(gpu));
-        let opaque = offsets().map(|offset| group(&layouts.no_depth, offset)).collect();
-        let transparent = offsets().map(|offset| group(opaque_depth, offset)).collect();
-        Ok(Self { frame_data, instances, opaque_depth: opaque_depth.clone(), opaque, transparent })
+        let before_opaque = offsets().map(|offset| group(opaque_depth, offset)).collect();
+        let alone = offsets().map(|offset| group(&layouts.no_depth, offset)).collect();
+        Ok(Self { frame_data, instances, opaque_depth: opaque_depth.clone(), before_opaque, alone })
     }
 }
 

@@ -3,7 +3,10 @@
 
 use std::ops::Range;
 
-use wgpu::{Extent3d, Origin3d, TextureFormat, TextureUsages};
+use wgpu::{
+    BindGroupLayoutEntry, BindingType, Extent3d, Origin3d, ShaderStages, StorageTextureAccess, TextureFormat,
+    TextureSampleType, TextureUsages, TextureViewDimension,
+};
 
 use crate::{Context, GpuError};
 
@@ -16,7 +19,7 @@ pub(crate) const GROUP_BYTES: u64 = size_of::<Group>() as u64;
 pub(crate) const GROUPS: TextureFormat = TextureFormat::Rgba32Uint;
 pub(crate) const PAIRS: TextureFormat = TextureFormat::Rg32Uint;
 
-/// Groups in a row, and rows in a layer: as many as every device has.
+/// Groups in a row, and rows in a layer, as many as every device has. Above 8.4 million groups a table is whole layers.
 const WIDTH: u64 = 1024;
 const HEIGHT: u64 = 8192;
 
@@ -52,12 +55,32 @@ pub(crate) fn bytes(format: TextureFormat, count: u64) -> u64 {
     texels * if format == PAIRS { GROUP_BYTES / 2 } else { GROUP_BYTES }
 }
 
-/// As shaders see it.
+/// As shaders see it, or any other array of textures, if it has one layer alone.
 pub(crate) fn view(table: &wgpu::Texture) -> wgpu::TextureView {
     table.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        dimension: Some(TextureViewDimension::D2Array),
         ..wgpu::TextureViewDescriptor::default()
     })
+}
+
+/// The binding of one that shaders read.
+pub(crate) fn read_entry(binding: u32, visibility: ShaderStages) -> BindGroupLayoutEntry {
+    let ty = BindingType::Texture {
+        sample_type: TextureSampleType::Uint,
+        view_dimension: TextureViewDimension::D2Array,
+        multisampled: false,
+    };
+    BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+/// The binding of one that shaders write, which excludes that they read it.
+pub(crate) fn stored_entry(binding: u32, visibility: ShaderStages, format: TextureFormat) -> BindGroupLayoutEntry {
+    let ty = BindingType::StorageTexture {
+        access: StorageTextureAccess::WriteOnly,
+        format,
+        view_dimension: TextureViewDimension::D2Array,
+    };
+    BindGroupLayoutEntry { binding, visibility, ty, count: None }
 }
 
 /// A new table of so many groups.
@@ -67,17 +90,7 @@ pub(crate) fn upload(
     count: u64,
     groups: impl IntoIterator<Item = Group>,
 ) -> Result<wgpu::Texture, GpuError> {
-    let descriptor = descriptor(label, GROUPS, count);
-    let (layers, limit) = (descriptor.size.depth_or_array_layers, gpu.limits.max_texture_array_layers);
-    if layers > limit {
-        return Err(GpuError::Limit {
-            what: format!("a table of {label}"),
-            size: layers.into(),
-            limit: limit.into(),
-            limit_name: "maxTextureArrayLayers",
-        });
-    }
-    let table = gpu.texture(&descriptor)?;
+    let table = gpu.texture(&descriptor(label, GROUPS, count))?;
     write(gpu, &table, groups);
     Ok(table)
 }

@@ -30,26 +30,32 @@ impl Gather {
     pub(crate) fn new(
         gpu: &Context,
         wgsl: &'static str,
-        picture_layout: &BindGroupLayout,
-        lfb_layout: &BindGroupLayout,
+        [picture_layout, lfb_layout]: [&BindGroupLayout; 2],
+        order_layout: Option<&BindGroupLayout>,
     ) -> Self {
         let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gather"),
             entries: &[0, 1].map(|binding| storage_entry(binding, ShaderStages::COMPUTE, false)),
         });
         let module = shader(gpu, "gather", wgsl);
-        let layouts = [Some(picture_layout), Some(&layout), None, Some(lfb_layout)];
+        let layouts = [Some(picture_layout), Some(&layout), order_layout, Some(lfb_layout)];
         let pipeline = |entry| compute_pipeline(gpu, "gather", &module, entry, &layouts, &[]);
         Self { count: pipeline("count"), copy: pipeline("copy"), layout }
     }
 
     /// Adds the ordered layers of a window to the frame's goal.
-    pub(crate) fn read(&self, frame: &mut Frame<'_>, window: Window, lfb: &BindGroup) -> Result<(), GpuError> {
+    pub(crate) fn read(
+        &self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        lfb: &BindGroup,
+        order: Option<&BindGroup>,
+    ) -> Result<(), GpuError> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let gpu = frame.gpu;
         let starts = gpu.buffer("the layers' counts", window.pixels() * 4, usage)?;
         let none = gpu.buffer("the layers", 16, usage)?;
-        self.dispatch(frame, &self.count, window, [&starts, &none], lfb)?;
+        self.dispatch(frame, &self.count, window, [&starts, &none], (lfb, order))?;
         let mut ends: Vec<u32> = read_buffer(frame, &starts, 0, window.pixels())?;
         let mut total = 0u64;
         let firsts: Vec<u32> = ends
@@ -63,7 +69,7 @@ impl Gather {
             .collect();
         gpu.queue.write_buffer(&starts, 0, bytemuck::cast_slice(&firsts));
         let gathered = gpu.buffer("the layers", (total * 16).max(16), usage)?;
-        self.dispatch(frame, &self.copy, window, [&starts, &gathered], lfb)?;
+        self.dispatch(frame, &self.copy, window, [&starts, &gathered], (lfb, order))?;
         let stored: Vec<[u32; 4]> = read_buffer(frame, &gathered, 0, total)?;
         let fragments = stored.into_iter().map(unpack).collect();
         let opaque = opaque_surfaces(frame, window)?;
@@ -80,7 +86,7 @@ impl Gather {
         pipeline: &ComputePipeline,
         window: Window,
         buffers: [&wgpu::Buffer; 2],
-        lfb: &BindGroup,
+        (lfb, order): (&BindGroup, Option<&BindGroup>),
     ) -> Result<(), GpuError> {
         let group = frame.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("gather"),
@@ -94,6 +100,7 @@ impl Gather {
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &frame.picture.bind_group, &[]);
         pass.set_bind_group(1, &group, &[]);
+        pass.set_bind_group(2, order, &[]);
         pass.set_bind_group(3, lfb, &[]);
         pass.dispatch_workgroups(window.width.div_ceil(GROUP_PX), window.height.div_ceil(GROUP_PX), 1);
         Ok(())

@@ -38,8 +38,13 @@ impl OpaquePass {
         Self { pipelines }
     }
 
-    /// Draws them, after clearing colour and depth, which is all there is to do for a scene without any.
+    /// Draws them, after clearing colour and depth, which is all there is to do for a scene without any; and not even that,
+    /// if nothing was drawn since they were cleared last.
     pub(crate) fn record(&mut self, frame: &mut Frame<'_>) -> Result<(), GpuError> {
+        let draws_any = frame.surfaces.has_opaque;
+        if frame.targets.opaque_is_clear.replace(!draws_any) && !draws_any {
+            return Ok(());
+        }
         let view = &frame.targets.opaque_color_view;
         let color = wgpu::RenderPassColorAttachment {
             view,

@@ -3,20 +3,22 @@
 //!
 //! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step
 //! "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
-//! the way to the resolve, in "read and blend", up to 8, 16 or 32 fragments are sorted in registers by networks
+//! the way to the resolve, in "read and blend", up to 4, 8, 16 or 32 fragments are sorted in registers by networks
 //! (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
-//! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n) and no memory but
-//! the capture's own. With `presort` all are sorted in place; of a technique whose fragments come in order, none.
+//! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n). With `presort` all
+//! are sorted in place; of a technique whose fragments come in order, none.
+//!
+//! Fragments in a buffer are sorted in no memory but the capture's own. Those in a texture cannot be moved: where any have to
+//! be sorted in place, references to them are (`shaders/shared/sorted.wesl`), 4 bytes for each slot of the capture.
 //!
 //! Rejected: insertion sort in a local array up to 32 fragments, which the LFB chapter (section 20.4.1) found the fastest,
-//! and heap sort of references above. llvmpipe reads and writes local arrays lane by lane and registers all lanes at once:
-//! sorting and blending hair took 289 ms with them, and takes 126.
+//! and heap sort for all above. llvmpipe reads and writes local arrays lane by lane and registers all lanes at once:
+//! sorting and blending hair took 289 ms with them, and 126 without.
 
 use std::collections::HashMap;
 
 use glam::Vec4;
 use pellucid_core::Resolve;
-use pellucid_core::primitive::Pass;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, RenderPipeline, ShaderModule, ShaderStages};
 
 use crate::frame::{Frame, Goal};
@@ -25,21 +27,35 @@ use crate::pass::gather::Gather;
 use crate::pass::grid::dispatch;
 use crate::pass::picture::GROUP_PX;
 use crate::pass::whole_window::WholeWindow;
+use crate::readback::read_buffer;
 use crate::surface::{shader, storage_entry};
 use crate::{Context, GpuError, shaders};
 
 /// Classes of runs, and pixels of a run. Twins in `shaders/shared/classes.wesl`.
-const CLASSES: u64 = 5;
+const CLASSES: u64 = 6;
+const BLOCKS: usize = 4;
+const MANY: usize = 5;
 const RUN_PX: u64 = 64;
+
+/// What resolves each class, if not all pixels have been sorted before.
+const BY_CLASS: [(usize, &str); CLASSES as usize] =
+    [(0, "fewest"), (1, "few"), (2, "some"), (3, "more"), (BLOCKS, "blocks"), (MANY, "in_order")];
 
 /// Runs that a workgroup classifies. Twin in `shaders/pass/classify.wesl`.
 const GROUP_RUNS: u64 = 64;
 
+/// Bytes of a reference to a fragment.
+const REFERENCE_BYTES: u64 = 4;
+
 /// Bytes of an indirect dispatch.
 const DISPATCH_BYTES: u64 = 12;
 
+/// The number of a constant in `shaders/shared/picture.wesl`.
+const HAS_OPAQUE: &str = "5";
+
 const RUNS: &str = "runs of pixels";
 const DISPATCHES: &str = "dispatches";
+const ORDER: &str = "order";
 
 /// The passes over an LFB, linked with its technique.
 #[derive(Debug, Clone, Copy)]
@@ -49,19 +65,27 @@ pub(crate) struct LfbShaders {
     pub(crate) sort: Option<&'static str>,
     pub(crate) resolve: &'static str,
     pub(crate) gather: &'static str,
+    /// Fragments lie in a texture, where they cannot be moved.
+    pub(crate) by_reference: bool,
 }
 
 /// Runs of pixels with fragments.
 pub(crate) struct Listed {
     /// Group 1 of passes over them.
     pub(crate) classes: BindGroup,
+    runs: wgpu::Buffer,
     /// One for each class.
     pub(crate) dispatches: wgpu::Buffer,
 }
 
 impl Listed {
     /// Where the dispatch of the last class is.
-    pub(crate) const MANY: u64 = (CLASSES - 1) * DISPATCH_BYTES;
+    pub(crate) const MANY: u64 = MANY as u64 * DISPATCH_BYTES;
+
+    /// How many each class has. Waits for the device.
+    fn runs_of_class(&self, frame: &mut Frame<'_>) -> Result<[u32; CLASSES as usize], GpuError> {
+        Ok(read_buffer(frame, &self.runs, 0, 1)?[0])
+    }
 }
 
 /// Long-lived half.
@@ -74,10 +98,12 @@ pub(crate) struct OrderedPasses {
     classify_module: ShaderModule,
     resolve_module: ShaderModule,
     layouts: [BindGroupLayout; 2],
+    /// Group 2 of what is sorted by reference.
+    order: Option<BindGroupLayout>,
     empty: WholeWindow,
-    /// One for each resolve that was asked for, one for each entry point and resolve, and one for each classification.
+    /// One for each resolve that was asked for, one for each entry point and what it is made for, and one for each classification.
     empties: HashMap<u32, RenderPipeline>,
-    resolves: HashMap<(&'static str, u32), ComputePipeline>,
+    resolves: HashMap<(&'static str, ResolveConstants), ComputePipeline>,
     classifies: HashMap<bool, ComputePipeline>,
     gather: Gather,
 }
@@ -90,11 +116,15 @@ impl OrderedPasses {
         picture_layout: &BindGroupLayout,
         lfb_layout: &BindGroupLayout,
     ) -> Self {
-        let buffer = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("classes"),
-            entries: &[storage_entry(0, ShaderStages::COMPUTE, false)],
-        });
-        let layouts = [Some(picture_layout), Some(&buffer), None, Some(lfb_layout)];
+        let layout = |label| {
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[storage_entry(0, ShaderStages::COMPUTE, false)],
+            })
+        };
+        let buffer = layout("classes");
+        let order = lfb.by_reference.then(|| layout(ORDER));
+        let layouts = [Some(picture_layout), Some(&buffer), order.as_ref(), Some(lfb_layout)];
         let prepare_layouts = [Some(picture_layout), Some(&buffer), Some(&buffer), Some(lfb_layout)];
         let classify_module = shader(gpu, "classify", lfb.classify);
         Self {
@@ -108,13 +138,14 @@ impl OrderedPasses {
             empties: HashMap::new(),
             resolves: HashMap::new(),
             classifies: HashMap::new(),
-            gather: Gather::new(gpu, lfb.gather, picture_layout, lfb_layout),
+            gather: Gather::new(gpu, lfb.gather, [picture_layout, lfb_layout], order.as_ref()),
+            order,
         }
     }
 
-    /// The layout of [`Listed::classes`].
-    pub(crate) fn classes_layout(&self) -> &BindGroupLayout {
-        &self.buffer
+    /// Groups 1 and 2 of passes over what is [`Listed`], or over pixels that are listed in the same way.
+    pub(crate) fn list_layouts(&self) -> [Option<&BindGroupLayout>; 2] {
+        [Some(&self.buffer), self.order.as_ref()]
     }
 
     /// All buffers it takes for so many pixels, with their bytes.
@@ -122,39 +153,63 @@ impl OrderedPasses {
         [(RUNS, CLASSES * (1 + pixels.div_ceil(RUN_PX)) * 4), (DISPATCHES, CLASSES * DISPATCH_BYTES)]
     }
 
-    /// Records everything that comes after the capture of a window: towards the picture, or towards layers.
-    pub(crate) fn record(&mut self, frame: &mut Frame<'_>, window: Window, lfb: &BindGroup) -> Result<(), GpuError> {
+    /// The buffer it takes besides, if fragments in so many slots have to be sorted by reference.
+    pub(crate) fn order_need(slots: u64) -> (&'static str, u64) {
+        (ORDER, slots * REFERENCE_BYTES)
+    }
+
+    /// Records everything that comes after the capture of a window: towards the picture, or towards layers. All fragments lie
+    /// in slots below `slots`.
+    pub(crate) fn record(
+        &mut self,
+        frame: &mut Frame<'_>,
+        window: Window,
+        lfb: &BindGroup,
+        slots: u64,
+    ) -> Result<(), GpuError> {
         let gpu = frame.gpu;
-        let code = resolve_code(frame.resolve);
+        let constants = ResolveConstants::of(frame);
         let wants_layers = matches!(frame.goal, Goal::Layers(_));
         let needs_order = wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
         let sorts_all = wants_layers || frame.presort || self.sort.is_none();
         let listed = self.list(frame, window, lfb, sorts_all || !needs_order)?;
+        let mut runs_of_class = None;
+        let order = match &self.order {
+            None => None,
+            Some(layout) => {
+                let mut sorts_by_reference = needs_order;
+                if needs_order && !sorts_all {
+                    let runs = listed.runs_of_class(frame)?;
+                    sorts_by_reference = runs[BLOCKS] + runs[MANY] > 0;
+                    runs_of_class = Some(runs);
+                }
+                Some(order_group(frame, layout, sorts_by_reference.then_some(slots))?)
+            }
+        };
         let groups = [&frame.picture.bind_group.clone(), &listed.classes, lfb];
         let dispatches = listed.dispatches;
 
-        let class = |number: u64| number * DISPATCH_BYTES;
-        let [few, some, more, blocks, many] = [0, 1, 2, 3, 4].map(class);
         if let Some(sort) = self.sort.as_ref().filter(|_| needs_order) {
             let mut pass = frame.compute_pass("sort")?;
-            set_groups(&mut pass, groups);
+            set_groups(&mut pass, groups, order.as_ref());
             pass.set_pipeline(sort);
-            pass.dispatch_workgroups_indirect(&dispatches, many);
+            pass.dispatch_workgroups_indirect(&dispatches, Listed::MANY);
         }
         let mut pass = frame.compute_pass("read and blend")?;
-        set_groups(&mut pass, groups);
-        let entries: &[(&'static str, u64)] = match (needs_order, sorts_all) {
-            (false, _) => &[("unordered", many)],
-            (true, true) => &[("in_order", many)],
-            (true, false) => &[("few", few), ("some", some), ("more", more), ("blocks", blocks), ("in_order", many)],
+        set_groups(&mut pass, groups, order.as_ref());
+        let classes = match (needs_order, sorts_all) {
+            (false, _) => &[(MANY, "unordered")][..],
+            (true, true) => &[(MANY, "in_order")],
+            (true, false) => &BY_CLASS,
         };
-        for &(entry, dispatch) in entries {
-            pass.set_pipeline(self.resolve(gpu, entry, code));
-            pass.dispatch_workgroups_indirect(&dispatches, dispatch);
+        // Without a pipeline for a class that has nothing, where that is known.
+        for &(class, entry) in classes.iter().filter(|(class, _)| runs_of_class.is_none_or(|runs| runs[*class] > 0)) {
+            pass.set_pipeline(self.resolve(gpu, entry, constants));
+            pass.dispatch_workgroups_indirect(&dispatches, class as u64 * DISPATCH_BYTES);
         }
         drop(pass);
         if wants_layers {
-            self.gather.read(frame, window, lfb)?;
+            self.gather.read(frame, window, lfb, order.as_ref())?;
         }
         Ok(())
     }
@@ -185,18 +240,18 @@ impl OrderedPasses {
         self.fill_empty_pixels(frame, window, code)?;
         frame.encoder().clear_buffer(&runs, 0, Some(CLASSES * 4));
         let mut pass = frame.compute_pass("classify")?;
-        set_groups(&mut pass, groups);
+        set_groups(&mut pass, groups, None);
         pass.set_pipeline(self.classify(gpu, one_class));
         dispatch(&mut pass, window.pixels().div_ceil(RUN_PX * GROUP_RUNS));
         pass.set_pipeline(&self.prepare);
         pass.set_bind_group(2, &prepared, &[]);
         pass.dispatch_workgroups(1, 1, 1);
         drop(pass);
-        Ok(Listed { classes, dispatches })
+        Ok(Listed { classes, runs, dispatches })
     }
 
     fn fill_empty_pixels(&mut self, frame: &mut Frame<'_>, window: Window, code: u32) -> Result<(), GpuError> {
-        if frame.surfaces.count(Pass::Opaque) == 0 {
+        if !frame.surfaces.has_opaque {
             let counts = matches!(frame.resolve, Resolve::Complexity(_));
             return frame.clear_picture("empty pixels", if counts { Vec4::ZERO } else { frame.view.background });
         }
@@ -215,20 +270,58 @@ impl OrderedPasses {
         })
     }
 
-    fn resolve(&mut self, gpu: &Context, entry: &'static str, code: u32) -> &ComputePipeline {
+    fn resolve(&mut self, gpu: &Context, entry: &'static str, constants: ResolveConstants) -> &ComputePipeline {
         let [picture, lfb] = &self.layouts;
-        let layouts = [Some(picture), Some(&self.buffer), None, Some(lfb)];
-        self.resolves.entry((entry, code)).or_insert_with(|| {
-            let constants = [("resolve", f64::from(code))];
-            compute_pipeline(gpu, "read and blend", &self.resolve_module, entry, &layouts, &constants)
+        let layouts = [Some(picture), Some(&self.buffer), self.order.as_ref(), Some(lfb)];
+        self.resolves.entry((entry, constants)).or_insert_with(|| {
+            compute_pipeline(gpu, "read and blend", &self.resolve_module, entry, &layouts, &constants.by_name())
         })
     }
 }
 
-fn set_groups(pass: &mut wgpu::ComputePass<'_>, [picture, classes, lfb]: [&BindGroup; 3]) {
+pub(crate) fn set_groups(
+    pass: &mut wgpu::ComputePass<'_>,
+    [picture, classes, lfb]: [&BindGroup; 3],
+    order: Option<&BindGroup>,
+) {
     pass.set_bind_group(0, picture, &[]);
     pass.set_bind_group(1, classes, &[]);
+    pass.set_bind_group(2, order, &[]);
     pass.set_bind_group(3, lfb, &[]);
+}
+
+/// References to fragments, whose slots lie below this; `None` if nothing is sorted.
+pub(crate) fn order_group(
+    frame: &mut Frame<'_>,
+    layout: &BindGroupLayout,
+    slots: Option<u64>,
+) -> Result<BindGroup, GpuError> {
+    let order = match slots.map(OrderedPasses::order_need) {
+        Some((name, bytes)) => frame.memory.buffer(frame.gpu, name, bytes)?,
+        None => frame.memory.any_buffer(frame.gpu, ORDER)?,
+    };
+    Ok(frame.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(ORDER),
+        layout,
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: order.as_entire_binding() }],
+    }))
+}
+
+/// What shaders that resolve are made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct ResolveConstants {
+    code: u32,
+    has_opaque: bool,
+}
+
+impl ResolveConstants {
+    pub(crate) fn of(frame: &Frame<'_>) -> Self {
+        Self { code: resolve_code(frame.resolve), has_opaque: frame.surfaces.has_opaque }
+    }
+
+    pub(crate) fn by_name(self) -> [(&'static str, f64); 2] {
+        [("resolve", self.code.into()), (HAS_OPAQUE, f64::from(u8::from(self.has_opaque)))]
+    }
 }
 
 /// Number of a resolve in `shaders/shared/resolve.wesl`.

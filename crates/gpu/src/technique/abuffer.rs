@@ -7,17 +7,14 @@
 //!
 //! As in the article, fragments are kept in memory or in an array of textures. In memory they lie layer by layer too, so
 //! that neighbouring pixels write side by side. WebGPU's floor cannot read and write one texture in a pass: from textures
-//! a table of layer numbers is sorted, 4 bytes more for each place. Rejected: a second array of textures to sort into.
+//! references to fragments are sorted. Rejected: a second array of textures to sort into.
 //!
 //! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear): main render 65 (bunny), 71
 //! (dragon), 69 (hair), 82 (Sponza), which is drawn again for each of the windows that deep pixels make necessary: 2 on the
 //! dragon, 16 on hair and Sponza; greatest count 1 to 7; read and blend 2 to 9.
 
 use pellucid_core::primitive::Pass;
-use wgpu::{
-    BindGroup, BindGroupLayout, BindingType, ComputePipeline, ShaderStages, StorageTextureAccess, TextureFormat,
-    TextureSampleType, TextureUsages,
-};
+use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, ShaderStages, TextureUsages};
 
 use super::growth::{Splits, most_that_fits};
 use super::{Capture, Layouts, Outcome};
@@ -26,20 +23,15 @@ use crate::memory::Window;
 use crate::pass::ordered::{LfbShaders, OrderedPasses, compute_pipeline, dispatch_window};
 use crate::readback::read_buffer;
 use crate::surface::{SurfacePass, SurfacePipelines, depth_state, shader, storage_entry};
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
 /// Bytes of a stored fragment.
 const FRAGMENT_BYTES: u64 = 16;
-/// Bytes of a layer's number.
-const ORDER_BYTES: u64 = 4;
-/// Of a texture's texels: a stored fragment.
-const FORMAT: TextureFormat = TextureFormat::Rgba32Uint;
 /// Length of the arrays as long as nothing is known.
 const FIRST_GUESS: u64 = 8;
 
 const COUNTS: &str = "counts";
 const FRAGMENTS: &str = "fragments";
-const ORDER: &str = "order";
 const LAYERS: &str = "layers";
 
 /// Where the A-buffer keeps fragments.
@@ -48,7 +40,8 @@ pub enum Storage {
     /// In a buffer, 16 bytes for each pixel and layer.
     #[default]
     Buffer,
-    /// In an array of textures, 20 bytes for each pixel and layer.
+    /// In an array of textures, 16 bytes for each pixel and layer, and 4 more if a pixel has more than 32, or all are put in order
+    /// in memory.
     Texture,
 }
 
@@ -71,8 +64,8 @@ struct Captured {
     group: BindGroup,
     /// Most fragments at one pixel.
     greatest: u64,
-    /// Whether there was room for so many.
-    is_whole: bool,
+    /// How many there was room for.
+    layers: u64,
 }
 
 /// An array of textures with room for so many layers of every pixel.
@@ -102,7 +95,7 @@ impl Storage {
             Self::Buffer => needs.push((FRAGMENTS, pixels * layers * FRAGMENT_BYTES)),
             Self::Texture => {
                 let shape = Shape::new(gpu, layers);
-                needs.push((ORDER, pixels * shape.layers() * ORDER_BYTES));
+                needs.push(OrderedPasses::order_need(pixels * shape.layers()));
                 let texture_bytes = pixels * u64::from(shape.rows) * FRAGMENT_BYTES;
                 needs.extend((0..shape.array_layers).map(|_| (LAYERS, texture_bytes)));
             }
@@ -124,28 +117,15 @@ impl Storage {
 impl ABuffer {
     pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>, storage: Storage) -> Self {
         let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
-        let own_layout = |label, last: Option<BindingType>| {
-            let last = last.map(|ty| wgpu::BindGroupLayoutEntry { binding: 2, visibility, ty, count: None });
-            let buffers = [0, 1].map(|binding| storage_entry(binding, visibility, false));
-            let entries: Vec<_> = buffers.into_iter().chain(last).collect();
-            gpu.device
-                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        let own_layout = |label, fragments| {
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[storage_entry(0, visibility, false), fragments],
+            })
         };
-        let view_dimension = wgpu::TextureViewDimension::D2Array;
         let (written, read) = match storage {
-            Storage::Buffer => (None, None),
-            Storage::Texture => (
-                Some(BindingType::StorageTexture {
-                    access: StorageTextureAccess::WriteOnly,
-                    format: FORMAT,
-                    view_dimension,
-                }),
-                Some(BindingType::Texture {
-                    sample_type: TextureSampleType::Uint,
-                    view_dimension,
-                    multisampled: false,
-                }),
-            ),
+            Storage::Buffer => (storage_entry(1, visibility, false), storage_entry(1, visibility, false)),
+            Storage::Texture => (table::stored_entry(1, visibility, table::GROUPS), table::read_entry(1, visibility)),
         };
         let layouts_of = [own_layout("abuffer, captured", written), own_layout("abuffer", read)];
         let (wgsl, ordered_shaders) = match storage {
@@ -156,6 +136,7 @@ impl ABuffer {
                     sort: Some(shaders::SORT_ABUFFER),
                     resolve: shaders::RESOLVE_ABUFFER,
                     gather: shaders::GATHER_ABUFFER,
+                    by_reference: false,
                 },
             ),
             Storage::Texture => (
@@ -165,6 +146,7 @@ impl ABuffer {
                     sort: Some(shaders::SORT_ABUFFER_TEXTURE),
                     resolve: shaders::RESOLVE_ABUFFER_TEXTURE,
                     gather: shaders::GATHER_ABUFFER_TEXTURE,
+                    by_reference: true,
                 },
             ),
         };
@@ -208,24 +190,26 @@ impl ABuffer {
         }
         frame.memory.make_room(&needs);
         let counts = frame.memory.buffer(gpu, needs[0].0, needs[0].1)?;
-        let table = frame.memory.buffer(gpu, needs[1].0, needs[1].1)?;
-        let (texture, there_are) = match self.storage {
-            Storage::Buffer => (None, table.size() / FRAGMENT_BYTES / pixels),
+        let (buffer, texture);
+        let (fragments, there_are) = match self.storage {
+            Storage::Buffer => {
+                buffer = frame.memory.buffer(gpu, FRAGMENTS, pixels * layers * FRAGMENT_BYTES)?;
+                (buffer.as_entire_binding(), buffer.size() / FRAGMENT_BYTES / pixels)
+            }
             Storage::Texture => {
                 let shape = Shape::new(gpu, layers);
-                let texture = frame.memory.texture(gpu, LAYERS, &texture_of(window, shape))?;
-                (Some(texture.create_view(&array_view())), shape.layers())
+                texture = table::view(&frame.memory.texture(gpu, LAYERS, &texture_of(window, shape))?);
+                (BindingResource::TextureView(&texture), shape.layers())
             }
         };
         let groups = self.layouts.each_ref().map(|layout| {
-            let buffers = [&counts, &table].map(wgpu::Buffer::as_entire_binding);
-            let resources = buffers.into_iter().chain(texture.as_ref().map(wgpu::BindingResource::TextureView));
-            let entries: Vec<_> =
-                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("abuffer"),
                 layout,
-                entries: &entries,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: counts.as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: fragments.clone() },
+                ],
             })
         });
         Ok((counts, groups, there_are))
@@ -245,7 +229,7 @@ impl ABuffer {
         dispatch_window(&mut pass, frame, window, &group);
         drop(pass);
         let greatest = u64::from(read_buffer::<u32>(frame, &counts, pixels, 1)?[0]);
-        Ok(Captured { counts, group, greatest, is_whole: greatest <= there_are })
+        Ok(Captured { counts, group, greatest, layers: there_are })
     }
 
     /// Parts of a window that fit, now that it is known how many fragments each pixel has.
@@ -281,8 +265,8 @@ impl Capture for ABuffer {
                 Some(_) => self.splits.learn(window, captured.greatest),
                 None => self.guess = captured.greatest.max(1),
             }
-            if captured.is_whole {
-                self.ordered.record(frame, window, &captured.group)?;
+            if captured.greatest <= captured.layers {
+                self.ordered.record(frame, window, &captured.group, pixels * captured.greatest)?;
                 return Ok(Outcome::Done);
             }
             frame.rerenders += 1;
@@ -305,13 +289,8 @@ fn texture_of(window: Window, shape: Shape) -> wgpu::TextureDescriptor<'static> 
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
+        format: table::GROUPS,
         usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
     }
-}
-
-/// An array even if it has one layer alone.
-fn array_view() -> wgpu::TextureViewDescriptor<'static> {
-    wgpu::TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() }
 }

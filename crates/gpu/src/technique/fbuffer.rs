@@ -103,6 +103,7 @@ impl FBuffer {
             sort: None,
             resolve: shaders::RESOLVE_FBUFFER,
             gather: shaders::GATHER_FBUFFER,
+            by_reference: false,
         };
         Self {
             prefix_sum: PrefixSum::new(gpu),
@@ -315,7 +316,7 @@ impl Capture for FBuffer {
         dispatch(&mut pass, total.div_ceil(LANES));
         drop(pass);
         let lfb = group(gpu, &self.lfb_layout, &[&ranges, &keys, &fragments]);
-        self.ordered.record(frame, window, &lfb)?;
+        self.ordered.record(frame, window, &lfb, total)?;
         Ok(Outcome::Done)
     }
 }

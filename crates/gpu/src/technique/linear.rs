@@ -20,7 +20,7 @@
 //! read (Sponza), the second pass does nearly all, and this technique is the fastest exact one where no window is cut.
 
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, ShaderStages};
+use wgpu::{BindGroupEntry, BindGroupLayout, BindingResource, ShaderStages};
 
 use super::{Capture, Layouts, Outcome};
 use crate::frame::Frame;
@@ -29,18 +29,25 @@ use crate::pass::ordered::{LfbShaders, OrderedPasses};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
 use crate::surface::{SurfacePass, SurfacePipelines, depth_state, storage_entry};
-use crate::{Context, GpuError, shaders};
-
-/// Bytes of a stored fragment.
-const FRAGMENT_BYTES: u64 = 16;
+use crate::{Context, GpuError, shaders, table};
 
 const OFFSETS: &str = "offsets";
 const FRAGMENTS: &str = "fragments";
 
+/// The passes over a linearized LFB, whoever captured it.
+pub(super) const ORDERED_SHADERS: LfbShaders = LfbShaders {
+    classify: shaders::CLASSIFY_LINEAR,
+    sort: Some(shaders::SORT_LINEAR),
+    resolve: shaders::RESOLVE_LINEAR,
+    gather: shaders::GATHER_LINEAR,
+    by_reference: true,
+};
+
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct Linear {
-    layout: BindGroupLayout,
+    /// Of the count pass, the capture, and what comes after it.
+    layouts: [BindGroupLayout; 3],
     count: SurfacePipelines,
     capture: SurfacePipelines,
     prefix_sum: PrefixSum,
@@ -49,12 +56,19 @@ pub(crate) struct Linear {
 
 impl Linear {
     pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
-        let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("linear"),
-            entries: &[0, 1].map(|binding| storage_entry(binding, visibility, false)),
-        });
-        let pass = |label, plain, varied, ignores_color| SurfacePass {
+        let (fragment, compute) = (ShaderStages::FRAGMENT, ShaderStages::COMPUTE);
+        let layout = |label, entries: &[_]| {
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let own_layouts = [
+            layout("linear, counted", &[storage_entry(0, fragment, false)]),
+            layout(
+                "linear, captured",
+                &[storage_entry(0, fragment, false), table::stored_entry(1, fragment, table::GROUPS)],
+            ),
+            layout("linear", &[storage_entry(0, compute, false), table::read_entry(1, compute)]),
+        ];
+        let pass = |label, plain, varied, ignores_color, own_layout| SurfacePass {
             label,
             wgsl: shaders::LINEAR,
             plain,
@@ -62,42 +76,44 @@ impl Linear {
             ignores_color,
             targets: &[],
             depth_stencil: depth_state(false, false),
-            own_layout: Some(&layout),
+            own_layout: Some(own_layout),
         };
         let pipelines = |pass| SurfacePipelines::new(gpu, layouts.surfaces, &pass);
-        let ordered_shaders = LfbShaders {
-            classify: shaders::CLASSIFY_LINEAR,
-            sort: Some(shaders::SORT_LINEAR),
-            resolve: shaders::RESOLVE_LINEAR,
-            gather: shaders::GATHER_LINEAR,
-        };
+        let [counted, captured, ordered] = &own_layouts;
         Self {
-            count: pipelines(pass("count render", "count", "count_varied", true)),
-            capture: pipelines(pass("main render", "capture", "capture_varied", false)),
+            count: pipelines(pass("count render", "count", "count_varied", true, counted)),
+            capture: pipelines(pass("main render", "capture", "capture_varied", false, captured)),
             prefix_sum: PrefixSum::new(gpu),
-            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
-            layout,
+            ordered: OrderedPasses::new(gpu, ORDERED_SHADERS, layouts.picture, ordered),
+            layouts: own_layouts,
         }
     }
 
     /// All buffers of a window with so many pixels and fragments.
     fn needs(pixels: u64, fragments: u64) -> Vec<(&'static str, u64)> {
-        let mut needs = vec![(OFFSETS, (pixels + 1) * 4), (FRAGMENTS, fragments * FRAGMENT_BYTES)];
+        let mut needs = vec![
+            (OFFSETS, (pixels + 1) * 4),
+            (FRAGMENTS, table::bytes(table::GROUPS, fragments)),
+            OrderedPasses::order_need(fragments),
+        ];
         needs.extend(PrefixSum::needs(pixels + 1));
         needs.extend(OrderedPasses::needs(pixels));
         needs
     }
+}
 
-    fn bind_group(&self, gpu: &Context, offsets: &wgpu::Buffer, fragments: &wgpu::Buffer) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("linear"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: offsets.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: fragments.as_entire_binding() },
-            ],
-        })
-    }
+fn bind_group(
+    gpu: &Context,
+    layout: &BindGroupLayout,
+    offsets: &wgpu::Buffer,
+    fragments: Option<&wgpu::TextureView>,
+) -> wgpu::BindGroup {
+    let resources = [Some(offsets.as_entire_binding()), fragments.map(BindingResource::TextureView)];
+    let entries: Vec<_> = (0..)
+        .zip(resources.into_iter().flatten())
+        .map(|(binding, resource)| BindGroupEntry { binding, resource })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("linear"), layout, entries: &entries })
 }
 
 impl Capture for Linear {
@@ -112,9 +128,8 @@ impl Capture for Linear {
         frame.memory.make_room(&Self::needs(pixels, 0));
         let offsets = frame.memory.buffer(gpu, OFFSETS, entries * 4)?;
         frame.zero("zero", &offsets, entries * 4)?;
-        // Counting does not touch the fragments.
-        let fragments = frame.memory.any_buffer(gpu, FRAGMENTS)?;
-        let group = self.bind_group(gpu, &offsets, &fragments);
+        let [counted, captured, ordered] = &self.layouts;
+        let group = bind_group(gpu, counted, &offsets, None);
         let mut pass = frame.capture_pass("count render", window)?;
         pass.set_bind_group(3, &group, &[]);
         frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.count);
@@ -134,13 +149,13 @@ impl Capture for Linear {
             // The offsets were given back too, as they were larger than they need to be: once more, in what fits.
             return self.window(frame, window);
         }
-        let fragments = frame.memory.buffer(gpu, FRAGMENTS, u64::from(total) * FRAGMENT_BYTES)?;
-        let group = self.bind_group(gpu, &offsets, &fragments);
+        let fragments = frame.memory.table(gpu, FRAGMENTS, table::GROUPS, total.into())?;
+        let [captured, group] = [captured, ordered].map(|layout| bind_group(gpu, layout, &offsets, Some(&fragments)));
         let mut pass = frame.capture_pass("main render", window)?;
-        pass.set_bind_group(3, &group, &[]);
+        pass.set_bind_group(3, &captured, &[]);
         frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.capture);
         drop(pass);
-        self.ordered.record(frame, window, &group)?;
+        self.ordered.record(frame, window, &group, total.into())?;
         Ok(Outcome::Done)
     }
 }

@@ -22,8 +22,10 @@
 //! faster; its links make reading two to three times as long. On the bunny a tenth of the frame is two threads taking turns
 //! at the counter.
 
+use std::num::NonZero;
+
 use pellucid_core::primitive::Pass;
-use wgpu::{BindGroupLayout, ShaderStages};
+use wgpu::{BindGroupEntry, BindGroupLayout, BindingResource, BufferBinding, ShaderStages};
 
 use super::growth::{STUCK, Splits, most_that_fits};
 use super::{Capture, Layouts, Outcome};
@@ -32,10 +34,8 @@ use crate::memory::{Estimate, Window};
 use crate::pass::ordered::{LfbShaders, OrderedPasses};
 use crate::readback::read_buffer;
 use crate::surface::{SurfacePass, SurfacePipelines, depth_state, storage_entry};
-use crate::{Context, GpuError, shaders};
+use crate::{Context, GpuError, shaders, table};
 
-/// Bytes of a stored fragment.
-const FRAGMENT_BYTES: u64 = 16;
 /// Bytes of a link.
 const NEXT_BYTES: u64 = 4;
 /// Head pointer and counter of a pixel, in words.
@@ -45,10 +45,19 @@ const HEADS: &str = "heads";
 const NEXTS: &str = "nexts";
 const FRAGMENTS: &str = "fragments";
 
+/// What came of a capture.
+struct Captured {
+    heads: wgpu::Buffer,
+    group: wgpu::BindGroup,
+    /// How many there are.
+    nodes: u32,
+}
+
 /// Long-lived half.
 #[derive(Debug)]
 pub(crate) struct List {
-    layout: BindGroupLayout,
+    /// Of the capture, and of what comes after it.
+    layouts: [BindGroupLayout; 2],
     capture: SurfacePipelines,
     ordered: OrderedPasses,
     estimate: Estimate,
@@ -57,11 +66,16 @@ pub(crate) struct List {
 
 impl List {
     pub(crate) fn new(gpu: &Context, layouts: Layouts<'_>) -> Self {
-        let visibility = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("list"),
-            entries: &[0, 1, 2].map(|binding| storage_entry(binding, visibility, false)),
-        });
+        let (fragment, compute) = (ShaderStages::FRAGMENT, ShaderStages::COMPUTE);
+        let layout = |label, stages, fragments| {
+            let [heads, nexts] = [0, 1].map(|binding| storage_entry(binding, stages, false));
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[heads, nexts, fragments],
+            })
+        };
+        let captured = layout("list, captured", fragment, table::stored_entry(2, fragment, table::GROUPS));
+        let ordered = layout("list", compute, table::read_entry(2, compute));
         let capture = SurfacePass {
             label: "main render",
             wgsl: shaders::LIST,
@@ -70,59 +84,61 @@ impl List {
             ignores_color: false,
             targets: &[],
             depth_stencil: depth_state(false, false),
-            own_layout: Some(&layout),
+            own_layout: Some(&captured),
         };
         let ordered_shaders = LfbShaders {
             classify: shaders::CLASSIFY_LIST,
             sort: Some(shaders::SORT_LIST),
             resolve: shaders::RESOLVE_LIST,
             gather: shaders::GATHER_LIST,
+            by_reference: true,
         };
         Self {
             capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
-            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &layout),
-            layout,
+            ordered: OrderedPasses::new(gpu, ordered_shaders, layouts.picture, &ordered),
+            layouts: [captured, ordered],
             estimate: Estimate::default(),
             splits: Splits::default(),
         }
     }
 
     /// All buffers of a window with so many pixels and nodes.
-    fn needs(pixels: u64, nodes: u64) -> [(&'static str, u64); 5] {
+    fn needs(pixels: u64, nodes: u64) -> [(&'static str, u64); 6] {
         let [runs, dispatches] = OrderedPasses::needs(pixels);
         let heads = (HEADS, (pixels * HEAD_WORDS + 1) * 4);
-        [heads, (NEXTS, nodes * NEXT_BYTES), (FRAGMENTS, nodes * FRAGMENT_BYTES), runs, dispatches]
+        let fragments = (FRAGMENTS, table::bytes(table::GROUPS, nodes));
+        [heads, (NEXTS, nodes * NEXT_BYTES), fragments, OrderedPasses::order_need(nodes), runs, dispatches]
     }
 
-    /// Captures with room for so many nodes; says how many there are, and, if there was room for them, where.
-    fn capture(
-        &mut self,
-        frame: &mut Frame<'_>,
-        window: Window,
-        room: u64,
-    ) -> Result<(wgpu::Buffer, wgpu::BindGroup, u32, bool), GpuError> {
+    /// Captures with room for so many nodes.
+    fn capture(&mut self, frame: &mut Frame<'_>, window: Window, room: u64) -> Result<Captured, GpuError> {
         let (gpu, pixels) = (frame.gpu, window.pixels());
         let needs = Self::needs(pixels, room);
         frame.memory.make_room(&needs);
-        let [heads, nexts, fragments, ..] = needs.map(|(name, bytes)| frame.memory.buffer(gpu, name, bytes));
-        let (heads, nexts, fragments) = (heads?, nexts?, fragments?);
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("list"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: heads.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: nexts.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 2, resource: fragments.as_entire_binding() },
-            ],
+        let [(heads, heads_bytes), (nexts, nexts_bytes), ..] = needs;
+        let heads = frame.memory.buffer(gpu, heads, heads_bytes)?;
+        let nexts = frame.memory.buffer(gpu, nexts, nexts_bytes)?;
+        let fragments = frame.memory.table(gpu, FRAGMENTS, table::GROUPS, room)?;
+        // The shader takes the length of the links for the room that there is.
+        let links = BufferBinding { buffer: &nexts, offset: 0, size: NonZero::new(room * NEXT_BYTES) };
+        let [captured, group] = self.layouts.each_ref().map(|layout| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("list"),
+                layout,
+                entries: &[
+                    BindGroupEntry { binding: 0, resource: heads.as_entire_binding() },
+                    BindGroupEntry { binding: 1, resource: BindingResource::Buffer(links.clone()) },
+                    BindGroupEntry { binding: 2, resource: BindingResource::TextureView(&fragments) },
+                ],
+            })
         });
-        frame.zero("zero", &heads, needs[0].1)?;
+        frame.zero("zero", &heads, heads_bytes)?;
         let mut pass = frame.capture_pass("main render", window)?;
-        pass.set_bind_group(3, &group, &[]);
+        pass.set_bind_group(3, &captured, &[]);
         frame.surfaces.draw(gpu, &mut pass, Pass::Transparent, &mut self.capture);
         drop(pass);
         let nodes: u32 = read_buffer(frame, &heads, pixels * HEAD_WORDS, 1)?[0];
-        let there_is = (nexts.size() / NEXT_BYTES).min(fragments.size() / FRAGMENT_BYTES);
-        Ok((heads, group, nodes, u64::from(nodes) <= there_is))
+        Ok(Captured { heads, group, nodes })
     }
 
     /// Parts of a window that fit, now that it is known how many fragments each pixel has.
@@ -151,14 +167,14 @@ impl Capture for List {
             return frame.memory.halves(gpu, window, &Self::needs(pixels, 1));
         };
         loop {
-            let (heads, group, nodes, is_whole) = self.capture(frame, window, room)?;
+            let Captured { heads, group, nodes } = self.capture(frame, window, room)?;
             if known.is_some() {
                 self.splits.learn(window, nodes.into());
             } else if nodes < STUCK {
                 self.estimate.learn(&window, nodes.into());
             }
-            if is_whole {
-                self.ordered.record(frame, window, &group)?;
+            if u64::from(nodes) <= room {
+                self.ordered.record(frame, window, &group, nodes.into())?;
                 return Ok(Outcome::Done);
             }
             frame.rerenders += 1;

@@ -92,6 +92,7 @@ impl Pages {
             sort: Some(shaders::SORT_PAGES),
             resolve: shaders::RESOLVE_PAGES,
             gather: shaders::GATHER_PAGES,
+            by_reference: false,
         };
         Self {
             capture: SurfacePipelines::new(gpu, layouts.surfaces, &capture),
@@ -160,7 +161,7 @@ impl Capture for Pages {
                 } else {
                     self.estimate.learn(&window, u64::from(pages) * PAGE_SIZE);
                 }
-                self.ordered.record(frame, window, &group)?;
+                self.ordered.record(frame, window, &group, u64::from(pages) * PAGE_SIZE)?;
                 return Ok(Outcome::Done);
             }
             frame.rerenders += 1;

@@ -145,7 +145,7 @@ impl Bin {
         layouts: &OwnLayouts,
     ) -> Result<(), GpuError> {
         let tests_alpha = frame.surfaces.has_cutoff(Pass::Transparent);
-        let tests_depth = frame.surfaces.count(Pass::Opaque) > 0;
+        let tests_depth = frame.surfaces.has_opaque;
         if !tests_depth && !tests_alpha {
             return Ok(());
         }

@@ -4,21 +4,21 @@
 use std::collections::HashMap;
 
 use pellucid_core::Resolve;
-use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule, ShaderStages};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, ShaderModule};
 
 use super::layouts::Bound;
 use super::work::FILTER_SIZE;
 use super::{DepthFilter, stage_group, stage_layout};
 use crate::frame::Frame;
 use crate::memory::Window;
-use crate::pass::ordered::{Listed, OrderedPasses, compute_pipeline, resolve_code};
+use crate::pass::ordered::{Listed, OrderedPasses, ResolveConstants, compute_pipeline, order_group, set_groups};
 use crate::readback::read_buffer;
-use crate::surface::{shader, storage_entry};
+use crate::surface::shader;
 use crate::technique::Layouts;
 use crate::{Context, GpuError, shaders};
 
-/// What a pipeline is made for: resolve, size of the filter, bits of the threshold, whether errors are shown.
-type Key = (u32, u32, u32, bool);
+/// What a pipeline is made for; behind the resolve: size of the filter, bits of the threshold, whether errors are shown.
+type Key = (ResolveConstants, u32, u32, bool);
 
 /// Long-lived half.
 #[derive(Debug)]
@@ -28,21 +28,23 @@ pub(super) struct Blend {
     /// The list of pixels out of order, and dispatches over it.
     wrong: BindGroupLayout,
     lfb: BindGroupLayout,
+    order: BindGroupLayout,
     module: ShaderModule,
     pipelines: HashMap<Key, ComputePipeline>,
     prepare: ComputePipeline,
     sort: ComputePipeline,
     resolve_module: ShaderModule,
-    resolves: HashMap<(&'static str, u32), ComputePipeline>,
+    resolves: HashMap<(&'static str, ResolveConstants), ComputePipeline>,
 }
 
 impl Blend {
     pub(super) fn new(gpu: &Context, layouts: Layouts<'_>, ordered: &OrderedPasses, lfb: &BindGroupLayout) -> Self {
         let wrong = stage_layout(gpu, &[(0, Bound::ReadWrite), (1, Bound::ReadWrite)]);
         let module = shader(gpu, "blend", shaders::LUCID_BLEND);
-        let (picture, classes) = (layouts.picture, ordered.classes_layout());
+        let picture = layouts.picture;
+        let [Some(classes), Some(order)] = ordered.list_layouts() else { unreachable!("it sorts by reference") };
         let own = [Some(picture), Some(classes), Some(&wrong), Some(lfb)];
-        let listed = [Some(picture), Some(classes), None, Some(lfb)];
+        let listed = [Some(picture), Some(classes), Some(order), Some(lfb)];
         let sort_module = shader(gpu, "repair", shaders::LUCID_SORT_WRONG);
         Self {
             prepare: compute_pipeline(gpu, "repair", &module, "prepare", &own, &[]),
@@ -51,6 +53,7 @@ impl Blend {
             classes: classes.clone(),
             wrong,
             lfb: lfb.clone(),
+            order: order.clone(),
             module,
             pipelines: HashMap::new(),
             resolve_module: shader(gpu, "repair", shaders::LUCID_RESOLVE_WRONG),
@@ -58,24 +61,26 @@ impl Blend {
         }
     }
 
-    /// Blends all pixels with fragments. `wrong` and `dispatches` are its own.
+    /// Blends all pixels with fragments, of which the LFB has so many. `wrong` and `dispatches` are its own.
     pub(super) fn record(
         &mut self,
         frame: &mut Frame<'_>,
         window: Window,
         listed: &Listed,
-        lfb: &BindGroup,
+        (lfb, fragments): (&BindGroup, u64),
         [wrong, dispatches]: [&wgpu::Buffer; 2],
     ) -> Result<(), GpuError> {
         let gpu = frame.gpu;
         let DepthFilter { size, threshold } = frame.depth_filter;
         let size = size.clamp(1, DepthFilter::GREATEST_SIZE);
-        let code = resolve_code(frame.resolve);
+        let resolve = ResolveConstants::of(frame);
         let shows_errors = frame.resolve == Resolve::Errors;
         let layouts = [Some(&self.picture), Some(&self.classes), Some(&self.wrong), Some(&self.lfb)];
-        let pipeline = self.pipelines.entry((code, size, threshold.to_bits(), shows_errors)).or_insert_with(|| {
+        let pipeline = self.pipelines.entry((resolve, size, threshold.to_bits(), shows_errors)).or_insert_with(|| {
+            let [resolve, has_opaque] = resolve.by_name();
             let constants = [
-                ("resolve", f64::from(code)),
+                resolve,
+                has_opaque,
                 (FILTER_SIZE, f64::from(size)),
                 ("threshold", f64::from(threshold)),
                 ("shows_errors", f64::from(u8::from(shows_errors))),
@@ -86,19 +91,16 @@ impl Blend {
         let group = stage_group(gpu, &self.wrong, &[], &[(0, wrong), (1, dispatches)]);
         frame.encoder().clear_buffer(wrong, 0, Some(8));
         let mut pass = frame.compute_pass("blend")?;
-        pass.set_bind_group(0, &picture, &[]);
-        pass.set_bind_group(1, &listed.classes, &[]);
-        pass.set_bind_group(2, &group, &[]);
-        pass.set_bind_group(3, lfb, &[]);
+        set_groups(&mut pass, [&picture, &listed.classes, lfb], Some(&group));
         pass.set_pipeline(pipeline);
         pass.dispatch_workgroups_indirect(&listed.dispatches, Listed::MANY);
         pass.set_pipeline(&self.prepare);
         pass.dispatch_workgroups(1, 1, 1);
         drop(pass);
-        if !shows_errors {
-            self.repair(frame, lfb, [wrong, dispatches])?;
-        }
         let [repaired, cut]: [u32; 2] = read_buffer(frame, wrong, 0, 1)?[0];
+        if repaired > 0 && !shows_errors {
+            self.repair(frame, (lfb, fragments), [wrong, dispatches])?;
+        }
         debug_assert!(u64::from(repaired) <= window.pixels(), "a pixel is listed once");
         frame.repaired_pixels += u64::from(repaired);
         frame.cut_pixels += u64::from(cut);
@@ -109,24 +111,22 @@ impl Blend {
     fn repair(
         &mut self,
         frame: &mut Frame<'_>,
-        lfb: &BindGroup,
+        (lfb, fragments): (&BindGroup, u64),
         [wrong, dispatches]: [&wgpu::Buffer; 2],
     ) -> Result<(), GpuError> {
         let gpu = frame.gpu;
+        let order = order_group(frame, &self.order, Some(fragments))?;
         let picture = frame.picture.bind_group.clone();
-        let code = resolve_code(frame.resolve);
+        let constants = ResolveConstants::of(frame);
         let group = stage_group(gpu, &self.classes, &[], &[(0, wrong)]);
         let mut pass = frame.compute_pass("repair")?;
-        pass.set_bind_group(0, &picture, &[]);
-        pass.set_bind_group(1, &group, &[]);
-        pass.set_bind_group(3, lfb, &[]);
+        set_groups(&mut pass, [&picture, &group, lfb], Some(&order));
         pass.set_pipeline(&self.sort);
         pass.dispatch_workgroups_indirect(dispatches, 0);
-        let layouts = [Some(&self.picture), Some(&self.classes), None, Some(&self.lfb)];
+        let layouts = [Some(&self.picture), Some(&self.classes), Some(&self.order), Some(&self.lfb)];
         for entry in ["blocks", "in_order"] {
-            let pipeline = self.resolves.entry((entry, code)).or_insert_with(|| {
-                let constants = [("resolve", f64::from(code))];
-                compute_pipeline(gpu, "repair", &self.resolve_module, entry, &layouts, &constants)
+            let pipeline = self.resolves.entry((entry, constants)).or_insert_with(|| {
+                compute_pipeline(gpu, "repair", &self.resolve_module, entry, &layouts, &constants.by_name())
             });
             pass.set_pipeline(pipeline);
             pass.dispatch_workgroups_indirect(dispatches, 0);
@@ -137,8 +137,5 @@ impl Blend {
 
 /// The layout of an LFB that is linear.
 pub(super) fn lfb_layout(gpu: &Context) -> BindGroupLayout {
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("fragments"),
-        entries: &[0, 1].map(|binding| storage_entry(binding, ShaderStages::COMPUTE, false)),
-    })
+    stage_layout(gpu, &[(0, Bound::ReadWrite), (1, Bound::Table)])
 }

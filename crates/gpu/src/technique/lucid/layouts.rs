@@ -6,6 +6,7 @@ use super::LoadedScene;
 use crate::Context;
 use crate::frame::Frame;
 use crate::surface::storage_entry;
+use crate::table;
 
 /// Bind group layouts that stages share. Group 3 of each is the buffers it works on, by the numbers of their bindings.
 #[derive(Debug)]
@@ -93,18 +94,12 @@ pub(super) fn stage_layout(gpu: &Context, bindings: &[(u32, Bound)]) -> BindGrou
 
 fn entry(binding: u32, bound: Bound) -> wgpu::BindGroupLayoutEntry {
     let compute = ShaderStages::COMPUTE;
-    let view_dimension = wgpu::TextureViewDimension::D2Array;
-    let ty = match bound {
-        Bound::Read => return storage_entry(binding, compute, true),
-        Bound::ReadWrite => return storage_entry(binding, compute, false),
-        Bound::Table => {
-            BindingType::Texture { sample_type: wgpu::TextureSampleType::Uint, view_dimension, multisampled: false }
-        }
-        Bound::Stored(format) => {
-            BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension }
-        }
-    };
-    wgpu::BindGroupLayoutEntry { binding, visibility: compute, ty, count: None }
+    match bound {
+        Bound::Read => storage_entry(binding, compute, true),
+        Bound::ReadWrite => storage_entry(binding, compute, false),
+        Bound::Table => table::read_entry(binding, compute),
+        Bound::Stored(format) => table::stored_entry(binding, compute, format),
+    }
 }
 
 pub(super) fn stage_group(

@@ -73,14 +73,14 @@ use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, TextureView};
 
 use self::layouts::{OwnLayouts, stage_group, stage_layout};
 use self::work::{
-    BLOCK_PARTS, CHUNK_HEADS, CHUNK_SUMS, CHUNKS, COVERING, Counts, DISPATCHES, DRAW_GROUPS, DRAWS, FRAGMENT_BYTES,
-    FRAGMENTS, Header, LISTS, OFFSETS, ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
+    BLOCK_PARTS, CHUNK_HEADS, CHUNK_SUMS, CHUNKS, COVERING, Counts, DISPATCHES, DRAW_GROUPS, DRAWS, FRAGMENTS, Header,
+    LISTS, OFFSETS, ORDERED, PARTS, PLACES, RECORDS, Shading, WORK, WRONG,
 };
 use super::growth::most_that_fits;
-use super::{Capture, Layouts, Outcome};
+use super::{Capture, Layouts, Outcome, linear};
 use crate::frame::{Frame, Goal};
 use crate::memory::Window;
-use crate::pass::ordered::{LfbShaders, OrderedPasses, compute_pipeline};
+use crate::pass::ordered::{OrderedPasses, compute_pipeline};
 use crate::pass::prefix_sum::PrefixSum;
 use crate::readback::read_buffer;
 use crate::surface::shader;
@@ -199,13 +199,7 @@ impl Lucid {
         let module = shader(gpu, "dispatches", shaders::LUCID_DISPATCH);
         let groups = [None, None, Some(&own.dispatches), Some(&own.work)];
         let lfb = blend::lfb_layout(gpu);
-        let lfb_shaders = LfbShaders {
-            classify: shaders::CLASSIFY_LINEAR,
-            sort: Some(shaders::SORT_LINEAR),
-            resolve: shaders::RESOLVE_LINEAR,
-            gather: shaders::GATHER_LINEAR,
-        };
-        let ordered = OrderedPasses::new(gpu, lfb_shaders, layouts.picture, &lfb);
+        let ordered = OrderedPasses::new(gpu, linear::ORDERED_SHADERS, layouts.picture, &lfb);
         Self {
             setup: setup::Setup::new(gpu, layouts.surfaces),
             bin: bin::Bin::new(gpu, &own),
@@ -345,15 +339,16 @@ impl Lucid {
         if frame.memory.make_room(&with_fragments) {
             return Ok(Attempt::Again);
         }
-        let fragments = frame.memory.buffer(gpu, FRAGMENTS, fragment_count * FRAGMENT_BYTES)?;
+        let fragments = frame.memory.table(gpu, FRAGMENTS, table::GROUPS, fragment_count)?;
         self.raster.shade(frame, &stage, &self.layouts, (&counts, &fragments))?;
-        let lfb = stage_group(gpu, &self.lfb, &[], &[(0, &buffers.offsets), (1, &fragments)]);
+        let lfb = stage_group(gpu, &self.lfb, &[(1, &fragments)], &[(0, &buffers.offsets)]);
         let needs_no_order = matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
         if matches!(frame.goal, Goal::Layers(_)) || needs_no_order || frame.presort {
-            self.ordered.record(frame, window, &lfb)?;
+            self.ordered.record(frame, window, &lfb, fragment_count)?;
         } else {
             let listed = self.ordered.list(frame, window, &lfb, true)?;
-            self.blend.record(frame, window, &listed, &lfb, [&buffers.wrong, &buffers.dispatches])?;
+            let buffers = [&buffers.wrong, &buffers.dispatches];
+            self.blend.record(frame, window, &listed, (&lfb, fragment_count), buffers)?;
         }
         frame.half_block_parts += u64::from(counts.half_blocks);
         Ok(Attempt::Done(counts, fragment_count))
@@ -402,12 +397,8 @@ impl Capture for Lucid {
             scene.meshes().iter().zip(&upload.meshes).map(|(mesh, uploaded)| setup::upload(gpu, mesh, uploaded));
         let quads = quads.collect::<Result<Vec<_>, GpuError>>()?;
         let atlas = upload.atlas.upload(gpu, scene.textures())?;
-        let pages = wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..wgpu::TextureViewDescriptor::default()
-        };
         let vertices = setup::upload_vertices(gpu, scene)?;
-        let atlas = atlas.create_view(&pages);
+        let atlas = table::view(&atlas);
         self.scene = Some(LoadedScene { revision: scene.revision(), quads, vertices, atlas });
         Ok(())
     }

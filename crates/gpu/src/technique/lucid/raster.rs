@@ -63,7 +63,10 @@ impl Raster {
             count_fragments: pipeline("cover", &cover, "count_fragments", &cover_buffers),
             place_fragments: pipeline("places", &cover, "place_fragments", &cover_buffers),
             cover_buffers,
-            shade_buffers: stage_layout(gpu, &[(1, Table), (7, Table), (9, ReadWrite), (10, Table), (11, Table)]),
+            shade_buffers: stage_layout(
+                gpu,
+                &[(1, Table), (7, Table), (9, Stored(table::GROUPS)), (10, Table), (11, Table)],
+            ),
             shade_module: shader(gpu, "shade", shaders::LUCID_RASTER),
             shade: HashMap::new(),
         }
@@ -117,7 +120,7 @@ impl Raster {
         frame: &mut Frame<'_>,
         stage: &Stage<'_>,
         layouts: &OwnLayouts,
-        (counts, fragments): (&Counts, &wgpu::Buffer),
+        (counts, fragments): (&Counts, &wgpu::TextureView),
     ) -> Result<(), GpuError> {
         let mut pass = self.cover_pass(frame, stage, "cover")?;
         pass.set_pipeline(&self.place_fragments);
@@ -125,9 +128,14 @@ impl Raster {
         drop(pass);
 
         let (gpu, buffers) = (frame.gpu, stage.buffers);
-        let tables =
-            [(1, &buffers.records), (7, &buffers.ordered), (10, &buffers.chunk_heads), (11, &buffers.covering)];
-        let group = stage_group(gpu, &self.shade_buffers, &tables, &[(9, fragments)]);
+        let tables = [
+            (1, &buffers.records),
+            (7, &buffers.ordered),
+            (9, fragments),
+            (10, &buffers.chunk_heads),
+            (11, &buffers.covering),
+        ];
+        let group = stage_group(gpu, &self.shade_buffers, &tables, &[]);
         let pipeline = self.shade.entry(stage.shading).or_insert_with(|| {
             let layouts = [Some(&layouts.picture), Some(&layouts.scene), None, Some(&self.shade_buffers)];
             compute_pipeline(gpu, "shade", &self.shade_module, "main", &layouts, &stage.shading.constants())

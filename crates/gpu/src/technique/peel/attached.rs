@@ -184,7 +184,7 @@ impl Attached {
                 wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
             Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
         };
-        let load = if frame.surfaces.count(Pass::Opaque) > 0 {
+        let load = if frame.surfaces.has_opaque {
             let targets = frame.targets;
             let depth = &recorded.attachments.depths[(layer % 2) as usize];
             frame.encoder().copy_texture_to_texture(

@@ -34,7 +34,6 @@ mod under;
 mod windowed;
 
 use pellucid_core::Resolve;
-use pellucid_core::primitive::Pass;
 
 use self::attached::Attached;
 use self::layers::Gathering;
@@ -133,7 +132,7 @@ impl Capture for Peel {
 
         let limit = Limit::new(frame);
         let mut gathering = is_wanted.then(Gathering::default);
-        let draws = frame.surfaces.count(Pass::Transparent) as u32;
+        let draws = frame.surfaces.count_transparent() as u32;
         let submitted_together = (SUBMITTED_DRAWS / draws.max(1)).clamp(1, SUBMITTED_PASSES);
         let mut passes = 0;
         let mut progress;
