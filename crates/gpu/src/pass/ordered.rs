@@ -173,17 +173,13 @@ impl OrderedPasses {
         let needs_order = wants_layers || !matches!(frame.resolve, Resolve::Nearest | Resolve::Complexity(_));
         let sorts_all = wants_layers || frame.presort || self.sort.is_none();
         let listed = self.list(frame, window, lfb, sorts_all || !needs_order)?;
-        let mut runs_of_class = None;
+        let sorts_by_class = needs_order && !sorts_all;
+        let runs_of_class = if sorts_by_class { Some(listed.runs_of_class(frame)?) } else { None };
         let order = match &self.order {
             None => None,
             Some(layout) => {
-                let mut sorts_by_reference = needs_order;
-                if needs_order && !sorts_all {
-                    let runs = listed.runs_of_class(frame)?;
-                    sorts_by_reference = runs[BLOCKS] + runs[MANY] > 0;
-                    runs_of_class = Some(runs);
-                }
-                Some(order_group(frame, layout, sorts_by_reference.then_some(slots))?)
+                let sorts_in_place = needs_order && runs_of_class.is_none_or(|runs| runs[BLOCKS] + runs[MANY] > 0);
+                Some(order_group(frame, layout, sorts_in_place.then_some(slots))?)
             }
         };
         let groups = [&frame.picture.bind_group.clone(), &listed.classes, lfb];
@@ -202,7 +198,7 @@ impl OrderedPasses {
             (true, true) => &[(MANY, "in_order")],
             (true, false) => &BY_CLASS,
         };
-        // Without a pipeline for a class that has nothing, where that is known.
+        // Without a pipeline for a class that has nothing: on llvmpipe each takes long to compile.
         for &(class, entry) in classes.iter().filter(|(class, _)| runs_of_class.is_none_or(|runs| runs[*class] > 0)) {
             pass.set_pipeline(self.resolve(gpu, entry, constants));
             pass.dispatch_workgroups_indirect(&dispatches, class as u64 * DISPATCH_BYTES);
