@@ -165,23 +165,15 @@ impl Context {
     /// A texture.
     pub(crate) fn texture(&self, descriptor: &wgpu::TextureDescriptor<'_>) -> Result<wgpu::Texture, GpuError> {
         let (label, size) = (descriptor.label.unwrap_or("a texture"), descriptor.size);
-        let (side, limit) = (size.width.max(size.height), self.limits.max_texture_dimension_2d);
-        if side > limit {
-            return Err(GpuError::Limit {
-                what: format!("a side of {label}"),
-                size: side.into(),
-                limit: limit.into(),
-                limit_name: "maxTextureDimension2D",
-            });
-        }
-        let (layers, limit) = (size.depth_or_array_layers, self.limits.max_texture_array_layers);
-        if layers > limit {
-            return Err(GpuError::Limit {
-                what: format!("the layers of {label}"),
-                size: layers.into(),
-                limit: limit.into(),
-                limit_name: "maxTextureArrayLayers",
-            });
+        let (side, layers, limits) = (size.width.max(size.height), size.depth_or_array_layers, &self.limits);
+        for (part, size, limit, limit_name) in [
+            ("a side", side, limits.max_texture_dimension_2d, "maxTextureDimension2D"),
+            ("the layers", layers, limits.max_texture_array_layers, "maxTextureArrayLayers"),
+        ] {
+            if size > limit {
+                let what = format!("{part} of {label}");
+                return Err(GpuError::Limit { what, size: size.into(), limit: limit.into(), limit_name });
+            }
         }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let texture = self.device.create_texture(descriptor);

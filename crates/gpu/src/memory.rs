@@ -275,7 +275,7 @@ impl Memory {
     pub(crate) fn any_buffer(&mut self, gpu: &Context, name: &'static str) -> Result<wgpu::Buffer, GpuError> {
         match self.buffers.get(name) {
             Some(buffer) => Ok(buffer.clone()),
-            None => self.buffer(gpu, name, 0),
+            None => self.buffer(gpu, name, 16),
         }
     }
 

@@ -5,7 +5,7 @@
 //! becomes where they end. Unlike the chapter's it is not padded to a power of two, and has one entry more, in which the
 //! total appears.
 //!
-//! Fragments lie in a texture: llvmpipe writes either as fast, and reads texels in half the time of a buffer's words (246 ms and
+//! Fragments lie in a texture: llvmpipe writes either about as fast, and reads texels in half the time of a buffer's words (246 ms and
 //! 135 for 7.9 million in Sponza). What stores wait for are cache lines, as neighbours on the screen are far apart here.
 //!
 //! **Where the time goes**, in percent of a frame of 1280 x 720 on llvmpipe, two cores (suite `peers` of the benchmark; the
