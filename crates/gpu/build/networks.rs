@@ -1,13 +1,13 @@
 //! Writes shaders that sort the fragments of a pixel in registers, which WGSL has no loops or generics for: registers are
 //! named variables, and what is done to each is written out.
 //!
-//! The networks are Batcher's odd-even merge sort (1968; Knuth, The Art of Computer Programming 3, section 5.2.2): 5, 19,
-//! 63 and 191 exchanges for 4, 8, 16 and 32 fragments. Up to 8 there is none with fewer, for 16 the best known has 60, for 32 185.
+//! The networks are Batcher's odd-even merge sort (1968; Knuth, The Art of Computer Programming 3, section 5.2.2): 1, 5,
+//! 19, 63 and 191 exchanges for 2, 4, 8, 16 and 32 fragments. Up to 8 there is none with fewer, for 16 the best known has 60, for 32 185.
 
 use std::fmt::Write;
 
 /// Fragments that are sorted in registers at once. The last is a block of more, sorted in place.
-const SIZES: [usize; 4] = [4, 8, 16, 32];
+const SIZES: [usize; 5] = [2, 4, 8, 16, 32];
 
 /// The module `package::shared::networks`.
 ///

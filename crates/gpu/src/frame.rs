@@ -15,6 +15,9 @@ use crate::surface::Surfaces;
 use crate::technique::DepthFilter;
 use crate::{Context, GpuError};
 
+/// The number of a constant in `shaders/shared/frame.wesl`.
+pub(crate) const HAS_OPAQUE: &str = "5";
+
 /// Format of [`Targets::picture`].
 pub(crate) const PICTURE_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 

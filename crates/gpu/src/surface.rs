@@ -312,9 +312,10 @@ impl<'a> Surfaces<'a> {
     ) {
         let draws = || self.draws.iter().filter(|draw| draw.pass == pass);
         let ignores_color = pipelines.ignores_color;
+        let has_opaque = self.has_opaque && pipelines.captures();
         let key = |draw: &SurfaceDraw| {
             let varied = if ignores_color { draw.has_cutoff } else { draw.varies };
-            PipelineKey { cull: draw.cull, varied, is_apart: draw.is_apart }
+            PipelineKey { cull: draw.cull, varied, is_apart: draw.is_apart, has_opaque }
         };
         draws().for_each(|draw| pipelines.make(gpu, self.layouts, key(draw)));
         let pipelines = &pipelines.pipelines;

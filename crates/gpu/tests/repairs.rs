@@ -134,8 +134,8 @@ fn a_repaired_capture_holds_what_its_formula_says() {
             let pixels = u64::from(view.width * view.height);
             let stats = gpu.render(scene, &view, Resolve::Blend, technique).unwrap().stats;
             let (fragments, greatest) = (stats.fragments, u64::from(stats.max_depth_complexity));
-            // Six classes of runs of 64 pixels, with their numbers and dispatches.
-            let lists = 6 * (pixels.div_ceil(64) * 4 + 4 + 12);
+            // Seven classes of runs of 16 pixels, with their numbers and dispatches.
+            let lists = 7 * (pixels.div_ceil(16) * 4 + 4 + 12);
             // Buffers have 16 bytes at least.
             let references = |slots: u64| if greatest > 32 { 4 * slots } else { 16 };
             let bytes = match (technique, storage) {

@@ -2,9 +2,9 @@
 //! `shaders/pass/{classify,sort,resolve}.wesl`, linked with the technique's own module.
 //!
 //! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step
-//! "classify" lists runs of 64 pixels by the greatest number of fragments at a pixel of theirs. Each class has shaders of its own, dispatched over its list. On
-//! the way to the resolve, in "read and blend", up to 4, 8, 16 or 32 fragments are sorted in registers by networks
-//! (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
+//! "classify" lists runs of 16 pixels by the greatest number of fragments at a pixel of theirs. Each class has shaders of its
+//! own, dispatched over its list, four runs to a workgroup. On the way to the resolve, in "read and blend", up to 2, 4, 8, 16
+//! or 32 fragments are sorted in registers by networks (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
 //! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n). With `presort` all
 //! are sorted in place; of a technique whose fragments come in order, none.
 //!
@@ -21,7 +21,7 @@ use glam::Vec4;
 use pellucid_core::Resolve;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, RenderPipeline, ShaderModule, ShaderStages};
 
-use crate::frame::{Frame, Goal};
+use crate::frame::{Frame, Goal, HAS_OPAQUE};
 use crate::memory::Window;
 use crate::pass::gather::Gather;
 use crate::pass::grid::dispatch;
@@ -32,26 +32,30 @@ use crate::surface::{shader, storage_entry};
 use crate::{Context, GpuError, shaders};
 
 /// Classes of runs, and pixels of a run. Twins in `shaders/shared/classes.wesl`.
-const CLASSES: u64 = 6;
-const BLOCKS: usize = 4;
-const MANY: usize = 5;
-const RUN_PX: u64 = 64;
+const CLASSES: u64 = 7;
+const BLOCKS: usize = 5;
+const MANY: usize = 6;
+const RUN_PX: u64 = 16;
 
 /// What resolves each class, if not all pixels have been sorted before.
-const BY_CLASS: [(usize, &str); CLASSES as usize] =
-    [(0, "fewest"), (1, "few"), (2, "some"), (3, "more"), (BLOCKS, "blocks"), (MANY, "in_order")];
+const BY_CLASS: [(usize, &str); CLASSES as usize] = [
+    (0, "up_to_2"),
+    (1, "up_to_4"),
+    (2, "up_to_8"),
+    (3, "up_to_16"),
+    (4, "up_to_32"),
+    (BLOCKS, "blocks"),
+    (MANY, "in_order"),
+];
 
-/// Runs that a workgroup classifies. Twin in `shaders/pass/classify.wesl`.
-const GROUP_RUNS: u64 = 64;
+/// Pixels that a workgroup classifies. Twins in `shaders/pass/classify.wesl`.
+const CLASSIFIED_PX: u64 = 64 * 64;
 
 /// Bytes of a reference to a fragment.
 const REFERENCE_BYTES: u64 = 4;
 
 /// Bytes of an indirect dispatch.
 const DISPATCH_BYTES: u64 = 12;
-
-/// The number of a constant in `shaders/shared/picture.wesl`.
-const HAS_OPAQUE: &str = "5";
 
 const RUNS: &str = "runs of pixels";
 const DISPATCHES: &str = "dispatches";
@@ -238,7 +242,7 @@ impl OrderedPasses {
         let mut pass = frame.compute_pass("classify")?;
         set_groups(&mut pass, groups, None);
         pass.set_pipeline(self.classify(gpu, one_class));
-        dispatch(&mut pass, window.pixels().div_ceil(RUN_PX * GROUP_RUNS));
+        dispatch(&mut pass, window.pixels().div_ceil(CLASSIFIED_PX));
         pass.set_pipeline(&self.prepare);
         pass.set_bind_group(2, &prepared, &[]);
         pass.dispatch_workgroups(1, 1, 1);

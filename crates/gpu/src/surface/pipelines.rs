@@ -6,6 +6,7 @@ use wgpu::BindGroupLayout;
 
 use super::{SurfaceLayouts, shader};
 use crate::Context;
+use crate::frame::HAS_OPAQUE;
 use crate::upload::corners::Corner;
 
 /// Which faces are left out.
@@ -23,6 +24,8 @@ pub(super) struct PipelineKey {
     pub(super) cull: Cull,
     pub(super) varied: bool,
     pub(super) is_apart: bool,
+    /// Whether fragments may lie behind something opaque.
+    pub(super) has_opaque: bool,
 }
 
 /// What a pass does with surfaces.
@@ -77,14 +80,22 @@ impl SurfacePipelines {
         }
     }
 
+    /// Whether it only writes to storage, behind no depth test: then the shader looks for what is hidden.
+    pub(super) fn captures(&self) -> bool {
+        self.targets.is_empty()
+    }
+
     pub(super) fn make(&mut self, gpu: &Context, layouts: &SurfaceLayouts, key: PipelineKey) {
+        let captures = self.captures();
         self.pipelines.entry(key).or_insert_with(|| {
-            let PipelineKey { cull, varied, is_apart } = key;
+            let PipelineKey { cull, varied, is_apart, has_opaque } = key;
             let (vertex_entries, fragment_entry) = match (varied, self.ignores_color) {
                 (true, _) => (["varied", "varied_apart"], self.varied),
                 (false, true) => (["position", "position_apart"], self.plain),
                 (false, false) => (["plain", "plain_apart"], self.plain),
             };
+            let looks = [(HAS_OPAQUE, f64::from(u8::from(has_opaque)))];
+            let constants = if captures { &looks[..] } else { &[] };
             let corners = [Some(wgpu::VertexBufferLayout {
                 array_stride: size_of::<Corner>() as u64,
                 step_mode: wgpu::VertexStepMode::Vertex,
@@ -112,7 +123,7 @@ impl SurfacePipelines {
                 fragment: Some(wgpu::FragmentState {
                     module: &self.fragment,
                     entry_point: Some(fragment_entry),
-                    compilation_options: Default::default(),
+                    compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
                     targets: &self.targets,
                 }),
                 multiview_mask: None,

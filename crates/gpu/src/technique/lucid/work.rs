@@ -83,7 +83,7 @@ const LISTED_BYTES: u64 = 12;
 pub(super) const DRAW_GROUPS: u64 = size_of::<DrawData>() as u64 / table::GROUP_BYTES;
 
 /// Words before the list of pixels out of order. Twin: `CLASSES` in `shaders/shared/classes.wesl`.
-const WRONG_HEADER: u64 = 6;
+const WRONG_HEADER: u64 = 7;
 
 /// Items of each list, or room for as many; in the order of the header's words.
 #[repr(C)]
