@@ -2,15 +2,19 @@
 //! and, of those that differ in where they keep fragments and in nothing else, the bits of each other.
 
 mod common;
+#[path = "common/flat_view.rs"]
+mod flat_view;
 
 use std::cell::RefCell;
 
+use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::oracle;
 use pellucid::gpu::{GpuError, GpuRenderer};
-use pellucid::{Error, Image, Layers, Renderer, Resolve, Scene, Technique, View};
+use pellucid::{Error, Image, Instance, Layers, Material, Mesh, Renderer, Resolve, Scene, Technique, View};
 use pellucid_conformance::suite::{Candidate, Case, Check, Prepared, Subject, prepare_all};
 
 use common::gpu;
+use flat_view::flat_view;
 
 /// Exact techniques that run on the GPU.
 fn techniques() -> impl Iterator<Item = Technique> {
@@ -146,6 +150,48 @@ fn sorting_before_the_resolve_changes_no_bit() {
                 assert!(pictures[0] == pictures[1], "{technique}, {source}, {resolve}");
             }
         }
+    }
+}
+
+/// To the nearest, of two the even one, on every device: those of WGSL's own packing may go either way.
+#[test]
+fn colours_are_kept_as_the_nearest_halves() {
+    let Some(device) = gpu(false) else { return };
+    // 2 to a power.
+    let power = |n: i32| 2f32.powi(n);
+    let cases = [
+        (1.0 + power(-11), 1.0),
+        (1.0 + 3.0 * power(-11), 1.0 + power(-9)),
+        (1.0 + power(-11) + power(-20), 1.0 + power(-10)),
+        (2.0 - power(-12), 2.0),
+        (65_488.0, 65_472.0),
+        (65_504.0, 65_504.0),
+        // The least normal half, and what lies below.
+        (power(-14), power(-14)),
+        (power(-14) - power(-25), power(-14)),
+        (power(-14) - 3.0 * power(-25), power(-14) - power(-23)),
+        (power(-24), power(-24)),
+        (power(-25), 0.0),
+        (3.0 * power(-25), power(-23)),
+        (power(-149), 0.0),
+        (0.0, 0.0),
+    ];
+    let mut scene = Scene::new();
+    for (i, (value, _)) in cases.into_iter().enumerate() {
+        let z = -(i as f32) / cases.len() as f32;
+        let corners = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]].map(|[x, y]| Vec3::new(x, y, z));
+        let mesh = scene.add_mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()).unwrap();
+        let material = scene.add_material(Material::translucent("", Vec4::new(value, value, value, 1.0))).unwrap();
+        scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+    }
+    let view = flat_view(&scene, 4, 4);
+    let expected = cases.map(|(_, half)| Vec4::new(half, half, half, 1.0));
+    for technique in [Technique::Linear, Technique::Peel] {
+        let visit = |layers: &Layers| {
+            let colors: Vec<Vec4> = layers.pixel(1, 1).iter().map(|fragment| fragment.color).collect();
+            assert_eq!(colors, expected, "{technique}");
+        };
+        device.layers(&scene, &view, technique, visit).unwrap();
     }
 }
 

@@ -3,9 +3,13 @@
 #[path = "common/flat_view.rs"]
 mod flat_view;
 
+use std::cmp::Reverse;
+
 use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::fragment::order_key;
-use pellucid::{Instance, Material, Mesh, Renderer, Resolve, Scene, Shading, Technique, View};
+use pellucid::{Instance, Layers, Material, Mesh, Renderer, Resolve, Scene, Shading, Technique, View};
+use pellucid_cpu::CpuRenderer;
+use pellucid_cpu::simd::levels;
 
 use flat_view::flat_view;
 
@@ -82,6 +86,53 @@ fn what_hardly_gets_through_is_seen_where_nothing_outshines_it() {
         let expected = render(&scene, Technique::Oracle);
         assert_eq!(expected == without, ends_early, "{layers} layers");
         assert!(render(&scene, Technique::Cpu) == expected, "{layers} layers");
+    }
+}
+
+/// Pixels of any number of layers, some of them equally deep: each pixel in an order of its own, then all in one.
+#[test]
+fn layers_come_out_in_order_at_any_number_and_level() {
+    // Two strips of the eight that are sorted side by side.
+    const PIXELS: usize = 16;
+    for count in (1..72).chain([95, 96, 97, 128, 129, 255, 256, 257, 500, 1000]) {
+        for alike in [false, true] {
+            let mut state = count as u64;
+            let mut random = move || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) as usize % 1000
+            };
+            let (mut positions, mut expected) = (Vec::new(), vec![Vec::new(); PIXELS]);
+            for layer in 0..count {
+                let common = random();
+                for (pixel, expected) in expected.iter_mut().enumerate() {
+                    let nearness = if alike { common } else { random() };
+                    if !alike && pixel % 3 == 2 && layer < random() % 4 {
+                        continue;
+                    }
+                    expected.push((nearness, positions.len() as u32 / 3));
+                    let (x, z) = ((2 * pixel + 1) as f32 - PIXELS as f32, nearness as f32 / 1000.0);
+                    positions.extend([Vec3::new(x - 0.5, -0.4, z), Vec3::new(x + 0.5, -0.4, z), Vec3::new(x, 0.6, z)]);
+                }
+            }
+            let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let mut scene = Scene::new();
+            let mesh = scene.add_mesh(Mesh::new(positions, triangles).unwrap()).unwrap();
+            let material = scene.add_material(Material::translucent("", Vec4::splat(0.5))).unwrap();
+            scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+            for layers in &mut expected {
+                layers.sort_unstable_by_key(|&key| Reverse(key));
+            }
+            let view = flat_view(&scene, PIXELS as u32, 1);
+            for (name, level) in levels() {
+                let visit = |layers: &Layers| {
+                    for (pixel, expected) in (0..).zip(&expected) {
+                        let primitives = layers.pixel(pixel, 0).iter().map(|fragment| fragment.primitive);
+                        assert!(primitives.eq(expected.iter().map(|&(_, number)| number)), "{count} layers at {name}");
+                    }
+                };
+                CpuRenderer::new(1).level(level).layers(&scene, &view, visit).unwrap();
+            }
+        }
     }
 }
 

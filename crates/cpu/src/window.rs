@@ -80,21 +80,3 @@ fn cut(bytes: &[u64], most: f64) -> Vec<Range<usize>> {
     runs.push(start..bytes.len());
     runs
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cuts_cover_everything_in_at_least_two_runs() {
-        for (bytes, most, expected) in [
-            (vec![0, 0], 10.0, vec![0..1, 1..2]),
-            (vec![4, 4, 4, 4], 1000.0, vec![0..2, 2..4]),
-            (vec![4, 4, 4, 4], 0.0, vec![0..1, 1..2, 2..3, 3..4]),
-            (vec![0, 0, 0, 9], 5.0, vec![0..3, 3..4]),
-            (vec![9, 0, 0, 0], 5.0, vec![0..1, 1..4]),
-        ] {
-            assert_eq!(cut(&bytes, most), expected, "{bytes:?}");
-        }
-    }
-}

@@ -9,9 +9,9 @@
 //! that neighbouring pixels write side by side. WebGPU's floor cannot read and write one texture in a pass: from textures
 //! references to fragments are sorted. Rejected: a second array of textures to sort into.
 //!
-//! **Where the time goes**, in percent of a frame in buffers, measured as for [`linear`](super::linear): main render 68 (bunny)
-//! and 65 (dragon), which is drawn again for each of the windows that deep pixels make necessary: 2 on the dragon, 16 on hair and
-//! Sponza; greatest count 12 and 3; read and blend 8 and 2.
+//! **Where the time goes**, in percent of a frame in buffers, measured as for [`linear`](super::linear): main render 70 (bunny)
+//! and 64 (dragon), which is drawn again for each of the windows that deep pixels make necessary: 2 on the dragon, 16 on hair and
+//! Sponza; greatest count 12 and 3; read and blend 8 and 3.
 
 use pellucid_core::primitive::Pass;
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, ShaderStages, TextureUsages};

@@ -13,11 +13,11 @@
 //!
 //! |               | bunny | dragon | hair | Sponza |
 //! |---|---|---|---|---|
-//! | count render   | 32 | 38 | 25 | 13 |
-//! | prefix sums    | 10 |  4 |  2 |  1 |
-//! | main render    | 40 | 54 | 50 | 76 |
-//! | sort           |  0 |  0 | 10 |  0 |
-//! | read and blend |  5 |  2 | 11 |  9 |
+//! | count render   | 34 | 39 | 29 | 13 |
+//! | prefix sums    |  9 |  4 |  2 |  2 |
+//! | main render    | 40 | 52 | 51 | 75 |
+//! | sort           |  0 |  0 |  6 |  0 |
+//! | read and blend |  5 |  2 | 11 |  8 |
 //!
 //! Meshes of small triangles are transformed and set up twice, which costs more than their fragments; where textures are
 //! read (Sponza), the second pass does nearly all, and this technique is the fastest exact one where no window is cut.

@@ -14,8 +14,8 @@
 //!
 //! How many pages a capture takes thus depends on timing a little; what is in them, once sorted, does not.
 //!
-//! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear): main render 74 (bunny), 89
-//! (dragon), 55 (hair), 73 (Sponza); sort 18 and read and blend 26 on hair, and 7 to 18 elsewhere. About as fast as `list`,
+//! **Where the time goes**, in percent of a frame, measured as for [`linear`](super::linear): main render 75 (bunny), 88
+//! (dragon), 55 (hair), 70 (Sponza); sort 14 and read and blend 29 on hair, and 6 to 18 elsewhere. About as fast as `list`,
 //! though its pages stay in a buffer, as sorting moves fragments from page to page.
 
 use pellucid_core::primitive::Pass;
