@@ -112,17 +112,17 @@ impl Technique {
             Self::Oracle => "32 B x fragments",
             Self::Alpha => "8 B x pixels",
             Self::Peel => "44 B x pixels, 60 B for gelly and blend:corrected",
-            Self::Linear => "4.38 B x pixels + 16 B (20 B if a pixel has more than 32) x fragments",
-            Self::List => "8.38 B x pixels + 20 B (24 B if a pixel has more than 32) x fragments",
+            Self::Linear => "5.75 B x pixels + 16 B (20 B if a pixel has more than 32) x fragments",
+            Self::List => "9.75 B x pixels + 20 B (24 B if a pixel has more than 32) x fragments",
             Self::ABuffer => {
-                "4.38 B x pixels + 16 B (20 B in textures, if it is above 32) x pixels x greatest depth complexity"
+                "5.75 B x pixels + 16 B (20 B in textures, if it is above 32) x pixels x greatest depth complexity"
             }
-            Self::Pages => "8.38 B x pixels + 68 B x pages of 4 fragments",
+            Self::Pages => "9.75 B x pixels + 68 B x pages of 4 fragments",
             Self::FBuffer => {
-                "8 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
+                "9.75 B x pixels + 80 B x triangles + 20 B x their rows + 28 B (40 B merged) x fragments + 32 B x slots"
             }
             Self::Lucid => {
-                "20.8 B x pixels + 80 B x visible triangles + 81 B x their parts in blocks of 8 x 8 pixels + 16 B (20 B if a pixel is repaired) x fragments"
+                "22.1 B x pixels + 80 B x visible triangles + 81 B x their parts in blocks of 8 x 8 pixels + 16 B (20 B if a pixel is repaired) x fragments"
             }
         }
     }

@@ -151,6 +151,8 @@ fn a_repaired_capture_holds_what_its_formula_says() {
                 (_, Storage::Texture) => 4 * pixels + 4 + 16 * pixels * greatest + references(pixels * greatest),
             };
             assert_eq!(stats.peak_bytes, bytes + lists, "{technique}, {storage:?}: {}", technique.memory_formula());
+            let of_a_pixel = if technique == Technique::ABuffer { 4.0 } else { 8.0 } + 7.0 * 4.0 / 16.0;
+            assert!(technique.memory_formula().starts_with(&format!("{of_a_pixel} B x pixels ")), "{technique}");
         }
     });
 }

@@ -4,9 +4,10 @@
 //! Step "empty pixels" draws what pixels without any become, over the whole window; where nothing is opaque, it clears. Step
 //! "classify" lists runs of 16 pixels by the greatest number of fragments at a pixel of theirs. Each class has shaders of its
 //! own, dispatched over its list, four runs to a workgroup. On the way to the resolve, in "read and blend", up to 2, 4, 8, 16
-//! or 32 fragments are sorted in registers by networks (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place and merged by their heads, as in Knowles, Leach and
-//! Zambetta's register-based block sort (2014). More are sorted in place before, in "sort", in O(n log n). With `presort` all
-//! are sorted in place; of a technique whose fragments come in order, none.
+//! or 32 fragments are sorted in registers by networks (`build/networks.rs`), and up to 256 in blocks of 32, sorted in place
+//! and merged by their heads, as in Knowles, Leach and Zambetta's register-based block sort (2014). More are sorted in place
+//! before, in "sort", in O(n log n). With `presort` all are sorted in place; of a technique whose fragments come in order,
+//! none.
 //!
 //! Fragments in a buffer are sorted in no memory but the capture's own. Those in a texture cannot be moved: where any have to
 //! be sorted in place, references to them are (`shaders/shared/sorted.wesl`), 4 bytes for each slot of the capture.
@@ -366,4 +367,24 @@ pub(crate) fn compute_pipeline(
         compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
         cache: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shaders::constant;
+
+    #[test]
+    fn classes_are_what_shaders_take_them_for() {
+        let shader = include_str!("../../shaders/shared/classes.wesl");
+        assert_eq!((constant(shader, "CLASSES"), constant(shader, "RUN")), (CLASSES, RUN_PX));
+        for (class, entry) in BY_CLASS {
+            let name = if class == MANY { "MANY".to_owned() } else { entry.to_uppercase() };
+            assert_eq!(constant(shader, &name), class as u64, "{name}");
+        }
+        let shader = include_str!("../../shaders/pass/classify.wesl");
+        assert_eq!(constant(shader, "SHARE") * constant(shader, "LANES"), CLASSIFIED_PX);
+        let number = format!("@id({HAS_OPAQUE}) override has_opaque");
+        assert!(include_str!("../../shaders/shared/frame.wesl").contains(&number));
+    }
 }

@@ -40,6 +40,7 @@ pub(crate) struct SurfacePass<'a> {
     pub(crate) varied: &'static str,
     /// Whether only the alpha test needs to know colours.
     pub(crate) ignores_color: bool,
+    /// None where it captures: then its shader has to look for what is hidden.
     pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
     pub(crate) depth_stencil: wgpu::DepthStencilState,
     /// Group 3.
