@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use pellucid::core::oracle;
 use pellucid::core::view::direction;
-use pellucid::{Camera, Renderer, Resolve, Scene, Technique, View, builtin};
+use pellucid::{Camera, Canvas, Image, Renderer, Resolve, Scene, Technique, View, builtin};
 use pellucid_conformance::layers;
 use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
 use pellucid_cpu::{CpuRenderer, simd};
@@ -83,6 +83,36 @@ fn bits_do_not_depend_on_the_simd_level() {
         for (name, level) in simd::levels() {
             let image = CpuRenderer::new(0).level(level).render(&scene, &view, Resolve::Blend).unwrap().image;
             assert!(image == expected, "{source} at level {name}");
+        }
+    }
+}
+
+/// What a canvas has kept of the picture before is never seen: not after things moved, nor in another size, before another
+/// background, after a resolve that paints everything, with tiles in bands, in windows, or after a picture from elsewhere.
+#[test]
+fn a_canvas_shows_what_a_new_picture_shows() {
+    let scenes =
+        ["@cyclic", "@boxes:n=3", "@grids:layers=70,tessellation=10"].map(|s| pellucid::load(s).unwrap().scene);
+    let renderers = [Renderer::new(), Renderer::new().threads(1).budget_bytes(50_000)];
+    let mut canvas = Canvas::new();
+    for (round, scene) in (0..3).flat_map(|_| &scenes).enumerate() {
+        for (azimuth, distance) in [(0.0, 1.0), (40.0, 5.0), (40.0, 5.0), (90.0, 20.0), (200.0, 2.0)] {
+            let [width, height] = if round % 3 == 2 { [97, 75] } else { [200, 110] };
+            let mut view = View::of(scene).size(width, height).opacity(0.5);
+            let towards_eye = direction(azimuth, 10.0);
+            view.camera.eye = view.camera.target + towards_eye * (scene.bounding_sphere().radius * distance);
+            if round > 4 && azimuth == 90.0 {
+                view.background = Vec4::new(0.2, 0.0, 0.4, 1.0);
+            }
+            let resolve = if azimuth == 200.0 { Resolve::Errors } else { Resolve::Blend };
+            let renderer = &renderers[round % renderers.len()];
+            let stats = renderer.render_into(scene, &view, resolve, &mut canvas).unwrap();
+            let frame = Renderer::new().render(scene, &view, resolve).unwrap();
+            assert!(frame.image == *canvas.image(), "round {round}, azimuth {azimuth}");
+            assert_eq!(frame.stats.fragments, stats.fragments);
+        }
+        if round == 6 {
+            canvas.put(Image::filled(200, 110, Vec4::ONE));
         }
     }
 }

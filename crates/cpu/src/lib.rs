@@ -7,6 +7,7 @@
 
 mod bin;
 mod blend;
+mod canvas;
 pub mod fbuffer;
 mod fragments;
 mod networks;
@@ -24,4 +25,5 @@ mod tile;
 mod transform;
 mod window;
 
+pub use canvas::Canvas;
 pub use renderer::CpuRenderer;

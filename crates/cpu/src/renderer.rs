@@ -11,11 +11,12 @@ use pellucid_core::primitive::{Draw, draws};
 use pellucid_core::resolve::{PixelResolver, finish};
 use pellucid_core::shading::GREATEST_COLOR;
 use pellucid_core::stats::Step;
-use pellucid_core::{Error, Fragment, Frame, Image, Layers, Resolve, Scene, Stats, Technique, View};
+use pellucid_core::{Error, Fragment, Frame, Layers, Resolve, Scene, Stats, Technique, View};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
+use crate::canvas::Canvas;
 use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
 use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
 use crate::transform::{Vertices, groups};
@@ -122,40 +123,56 @@ impl CpuRenderer {
     /// # Errors
     /// If the view is invalid or the threads cannot be started.
     pub fn render(&self, scene: &Scene, view: &View, resolve: Resolve) -> Result<Frame, Error> {
+        let mut canvas = Canvas::new();
+        let stats = self.render_into(scene, view, resolve, &mut canvas)?;
+        Ok(Frame { image: canvas.into_image(), stats })
+    }
+
+    /// Renders a view into a canvas: the picture is the one that [`Self::render`] makes, but what was the background in the
+    /// canvas before, and is it again, is not written.
+    ///
+    /// # Errors
+    /// As [`Self::render`]; the canvas then has the picture it had.
+    pub fn render_into(
+        &self,
+        scene: &Scene,
+        view: &View,
+        resolve: Resolve,
+        canvas: &mut Canvas,
+    ) -> Result<Stats, Error> {
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
-            // Setting triangles up is bound by the processor, filling the picture by memory: side by side they take less.
-            let (begun, mut image) = rayon::join(|| run.begin(memory), || filled(view));
-            let bands: Vec<Mutex<&mut [Vec4]>> =
-                image.pixels_mut().chunks_mut(TILE_PX as usize * view.width as usize).map(Mutex::new).collect();
+            let begun = if canvas.suits(view) {
+                run.begin(memory)
+            } else {
+                // Setting triangles up is bound by the processor, filling the picture by memory: side by side they take less.
+                rayon::join(|| run.begin(memory), || canvas.fill(view)).0
+            };
+            let rows = canvas.rows(view);
             let resolver = PixelResolver::new(resolve, view);
             run.for_each_tile(memory, begun, |frame, capture, buffers| {
+                let rect = capture.rect;
+                let row = &rows[rect.top as usize / TILE_PX as usize];
                 if resolve == Resolve::Blend {
                     if capture.fragments.len() == 0 && !capture.has_opaque {
-                        return;
+                        return lock(row).leave(rect);
                     }
                     capture.blend(frame, view.background, &mut buffers.pixels);
                 } else {
                     capture.layers(frame, &mut buffers.layers);
                     let layers = &buffers.layers;
                     for (sample, x, y) in capture.pixels() {
-                        let (x, y) = ((x - capture.rect.left) as u32, (y - capture.rect.top) as u32);
+                        let (x, y) = ((x - rect.left) as u32, (y - rect.top) as u32);
                         buffers.pixels[sample] = resolver.pixel(layers.pixel(x, y), layers.opaque(x, y));
                     }
                 }
-                let PixelRect { left, top, right, bottom } = capture.rect;
-                let (left, width) = (left as usize, (right - left + 1) as usize);
-                let (band, first_row) = (top as usize / TILE_PX as usize, top as usize % TILE_PX as usize);
-                let mut band = lock(&bands[band]);
-                let rows = band.chunks_mut(view.width as usize).skip(first_row).take((bottom - top + 1) as usize);
-                for (to, from) in rows.zip(buffers.pixels.chunks(TILE_PX as usize)) {
-                    to[left..left + width].copy_from_slice(&from[..width]);
-                }
+                lock(row).paint(rect, &buffers.pixels);
             });
-            drop(bands);
+            drop(rows);
+            canvas.painted(view);
             let stats = run.finish();
-            finish(resolve, &mut image, &stats);
-            Ok(Frame { image, stats })
+            finish(resolve, canvas.image_mut(), &stats);
+            Ok(stats)
         })
     }
 
@@ -448,11 +465,4 @@ impl Memory {
 /// What a mutex guards. A panic elsewhere ends the frame anyway.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// A picture of the background, made by all threads.
-fn filled(view: &View) -> Image {
-    let count = view.width as usize * view.height as usize;
-    let pixels = rayon::iter::repeat_n(view.background, count).with_min_len(1 << 15);
-    Image::from_pixels(view.width, view.height, pixels.collect())
 }

@@ -1,5 +1,7 @@
 //! What of sixteen triangles is in sight: bounds, sides and, of the small ones, every covered sample, in blocks of 8 x 8.
 
+use std::hint::black_box;
+
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, i32x16};
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
@@ -88,13 +90,15 @@ impl Sight {
         let columns = small.select(width, zero).reduce_max();
         let rows = small.select(height, zero).reduce_max();
         let (x, y) = ((left << 8) + center(0), (top << 8) + center(0));
-        let edges =
-            [edge((bx, by), (cx, cy), (x, y)), edge((cx, cy), (ax, ay), (x, y)), edge((ax, ay), (bx, by), (x, y))];
+        let (a, b, c, first) = ([ax, ay], [bx, by], [cx, cy], [x, y]);
+        let edges = [Edge::new(b, c, first), Edge::new(c, a, first), Edge::new(a, b, first)];
         let mut any = zero;
+        let mut row = edges;
         for down in (0..rows).step_by(BLOCK_PX as usize) {
+            let mut block = row;
             for across in (0..columns).step_by(BLOCK_PX as usize) {
-                let size = [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)];
-                let mut halves = cover_block(simd, &edges, [across, down], size);
+                let mut halves =
+                    cover_block(simd, &block, [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)]);
                 if leaves_window {
                     // Beyond the bounds there are no samples, but beyond the window there may be.
                     halves = within(simd, halves, width - across, height - down);
@@ -102,6 +106,12 @@ impl Sight {
                 any = any | halves[0] | halves[1];
                 sight.blocks[sight.block_count] = Block { across, down, halves: halves.map(Into::into) };
                 sight.block_count += 1;
+                for edge in &mut block {
+                    edge.value += edge.right * BLOCK_PX;
+                }
+            }
+            for edge in &mut row {
+                edge.value += edge.down * BLOCK_PX;
             }
         }
         small &= !any.simd_eq(0);
@@ -126,18 +136,22 @@ impl Sight {
     }
 }
 
-/// Of the samples of a block those in the first so many columns and rows.
+/// Of the samples of a block those in the first so many columns and rows. Rarely asked for.
 #[inline(always)]
 fn within<S: Simd>(simd: S, halves: [i32x16<S>; 2], columns: i32x16<S>, rows: i32x16<S>) -> [i32x16<S>; 2] {
-    let [low, high]: [[i32; LANES]; 2] = halves.map(Into::into);
-    let (columns, rows): ([i32; LANES], [i32; LANES]) = (columns.into(), rows.into());
-    let (mut low_within, mut high_within) = ([0; LANES], [0; LANES]);
-    for lane in 0..LANES {
-        let mask = columns_mask(columns[lane]) & rows_mask(rows[lane]);
-        low_within[lane] = low[lane] & mask as i32;
-        high_within[lane] = high[lane] & (mask >> 32) as i32;
+    #[cold]
+    #[inline(never)]
+    fn within(halves: &mut [[i32; LANES]; 2], columns: &[i32; LANES], rows: &[i32; LANES]) {
+        let [low, high] = halves;
+        for lane in 0..LANES {
+            let mask = columns_mask(columns[lane]) & rows_mask(rows[lane]);
+            low[lane] &= mask as i32;
+            high[lane] &= (mask >> 32) as i32;
+        }
     }
-    [i32x16::load_array(simd, low_within), i32x16::load_array(simd, high_within)]
+    let mut halves = halves.map(Into::into);
+    within(&mut halves, &columns.into(), &rows.into());
+    halves.map(|half| i32x16::load_array(simd, half))
 }
 
 /// The first so many columns of a block.
@@ -154,29 +168,26 @@ fn rows_mask(count: i32) -> u64 {
 
 /// The samples of a block that lie inside three edges: rows 0 to 3 and 4 to 7, a bit for each.
 #[inline(always)]
-fn cover_block<S: Simd>(
-    simd: S,
-    [a, b, c]: &[(i32x16<S>, i32x16<S>, i32x16<S>); 3],
-    [across, down]: [i32; 2],
-    [columns, rows]: [i32; 2],
-) -> [i32x16<S>; 2] {
+fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x16<S>; 2] {
+    // Seen to be at most 8, loops would be unrolled, and multiples of steps that are hardly ever taken computed beforehand.
+    let [columns, rows] = black_box(size);
+    let [a, b, c] = edges;
     let zero = i32x16::splat(simd, 0);
-    let mut a_row = a.2 + a.0 * across + a.1 * down;
-    let mut b_row = b.2 + b.0 * across + b.1 * down;
-    let mut c_row = c.2 + c.0 * across + c.1 * down;
+    let mut row = [a.value, b.value, c.value];
     let mut halves = [zero; 2];
-    for row in 0..rows {
-        let mut bit = i32x16::splat(simd, 1 << ((row & 3) * BLOCK_PX));
-        let (mut a_here, mut b_here, mut c_here) = (a_row, b_row, c_row);
-        let mut covered = zero;
-        for _ in 0..columns {
-            covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
-            bit <<= 1;
-            (a_here, b_here, c_here) = (a_here + a.0, b_here + b.0, c_here + c.0);
+    for (half, rows) in halves.iter_mut().zip([rows.min(BLOCK_PX / 2), rows - BLOCK_PX / 2]) {
+        let mut bits = i32x16::splat(simd, 1);
+        for _ in 0..rows {
+            let [mut a_here, mut b_here, mut c_here] = row;
+            let mut bit = bits;
+            for _ in 0..columns {
+                *half |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+                bit <<= 1;
+                (a_here, b_here, c_here) = (a_here + a.right, b_here + b.right, c_here + c.right);
+            }
+            bits <<= BLOCK_PX as u32;
+            row = [row[0] + a.down, row[1] + b.down, row[2] + c.down];
         }
-        let half = &mut halves[usize::from(row >= 4)];
-        *half |= covered;
-        (a_row, b_row, c_row) = (a_row + a.1, b_row + b.1, c_row + c.1);
     }
     halves
 }
@@ -193,16 +204,23 @@ fn last_sample<S: Simd>(subpixels: i32x16<S>) -> i32x16<S> {
     (subpixels - SUBPIXELS / 2) >> 8
 }
 
-/// An edge as [`pellucid_core::pixel_grid::Edge`] has it: change for one sample to the right and downwards, and value at a
-/// position, less 1 if the line itself is outside.
-#[inline(always)]
-fn edge<S: Simd>(
-    from: (i32x16<S>, i32x16<S>),
-    to: (i32x16<S>, i32x16<S>),
-    at: (i32x16<S>, i32x16<S>),
-) -> (i32x16<S>, i32x16<S>, i32x16<S>) {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let value = dx * (at.1 - from.1) - dy * (at.0 - from.0);
-    let owns_line = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));
-    ((from.1 - to.1) << 8, dx << 8, owns_line.select(value, value - 1))
+/// An edge of sixteen triangles as [`pellucid_core::pixel_grid::Edge`] has it.
+#[derive(Clone, Copy)]
+struct Edge<S: Simd> {
+    /// Change for one sample to the right.
+    right: i32x16<S>,
+    /// Change for one sample downwards.
+    down: i32x16<S>,
+    /// Value at a position, less 1 if the line itself is outside.
+    value: i32x16<S>,
+}
+
+impl<S: Simd> Edge<S> {
+    #[inline(always)]
+    fn new(from: [i32x16<S>; 2], to: [i32x16<S>; 2], at: [i32x16<S>; 2]) -> Self {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let value = dx * (at[1] - from[1]) - dy * (at[0] - from[0]);
+        let owns_line = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));
+        Self { right: (from[1] - to[1]) << 8, down: dx << 8, value: owns_line.select(value, value - 1) }
+    }
 }

@@ -1,17 +1,21 @@
 //! Small triangles to fragments, sixteen triangles at a time.
 //!
-//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up: the
-//! first of all sixteen triangles in one go, then the second, and so on. All that is left for the tile is to order and
-//! blend them. A triangle that reaches several blocks of samples takes part once for each.
+//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up, eight at
+//! a time, of as many triangles as that takes. All that is left for the tile is to order and blend them. A triangle that
+//! reaches several blocks of samples takes part once for each.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, f32x16, i32x16};
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::{
+    Bytes, Level, Simd, SimdBase, SimdCombine, SimdInt, SimdInterleaved, SimdSplit, SimdWiden, dispatch,
+};
+use fearless_simd::{f32x8, f32x16, i32x8, i32x16, u16x8, u32x4, u32x8};
 use glam::Vec3;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 use prefetch_index::prefetch_index;
 
 use crate::bin::{TILE_PX, TileGrid};
-use crate::simd::{Wide, light};
+use crate::simd::{Lookup, Wide, light, narrow, widen};
 use crate::transform::DrawVertices;
 
 pub(crate) const LANES: usize = 16;
@@ -28,7 +32,8 @@ const SAMPLE_BITS: u32 = 10;
 const _: () = assert!(1 << SAMPLE_BITS == TILE_PX * TILE_PX);
 
 /// A fragment of a small triangle.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct SmallFragment {
     pub(crate) depth: f32,
     /// Brightness of its surface.
@@ -69,6 +74,8 @@ pub(crate) struct SmallTriangles {
     top: [i32; LANES],
     /// ... and which ones of it are covered, row by row.
     covered: [u64; LANES],
+    /// All samples that the sixteen cover.
+    samples: Samples,
 }
 
 impl SmallTriangles {
@@ -157,62 +164,119 @@ impl SmallTriangles {
             steady_light = light(simd, in_view(draw, normal));
         }
 
-        // Fragments are made in turns but put down in draw order.
-        let mut next = [0; LANES];
-        let mut covered = [0; LANES];
-        let mut primitives = [0; LANES];
-        let mut place = 0;
-        // A bit for each lane that has fragments left.
-        let mut active = 0u32;
+        let samples = &mut self.samples;
+        samples.count = 0;
+        let mut ends = [0; 2];
         for lane in 0..triangle_count {
-            next[lane] = place;
-            covered[lane] = self.covered[lane];
-            primitives[lane] = draw.first_primitive + self.triangles[lane];
-            place += covered[lane].count_ones() as usize;
-            active |= u32::from(covered[lane] != 0) << lane;
+            samples.add(lane, self.covered[lane]);
+            ends[lane / HALF] = samples.count;
         }
-        let (new_places, new_fragments) = fragments.add(place);
-        let left = i32x16::load_array(simd, self.left);
-        let top = i32x16::load_array(simd, self.top);
+        ends[1] = samples.count;
+        let (new_places, new_fragments) = fragments.add(samples.count, HALF);
+        let (left, top) = (i32x16::load_array(simd, self.left), i32x16::load_array(simd, self.top));
+        let primitives =
+            i32x16::load_array(simd, self.triangles.map(|triangle| (draw.first_primitive + triangle) as i32));
+        let places = [left - grid.window.left, top - grid.window.top];
+        let from_anchor = [left - anchor_x, top - anchor_y];
+        let halves = |values: f32x16<S>| <[f32x8<S>; 2]>::from(values.split());
+        let int_halves = |values: i32x16<S>| <[i32x8<S>; 2]>::from(values.split());
+        let places = places.map(int_halves);
+        let from_anchor = from_anchor.map(int_halves);
+        let depth_range = [least, greatest].map(halves);
+        let primitives = int_halves(primitives);
+        let steady_light = halves(steady_light);
+        let depth_plane = [depth_plane.value.words(), depth_plane.dx.words(), depth_plane.dy.words()];
+        let normal_planes = normal_planes.map(|planes| planes.map(|plane| plane.map(halves)));
+        let draw_numbers = u32x8::splat(simd, draw_number);
         let last = TILE_PX as i32 - 1;
-        while active != 0 {
-            let mut bits = [0; LANES];
-            for (bit, covered) in bits.iter_mut().zip(&covered) {
-                *bit = covered.trailing_zeros() as i32;
-            }
-            let bits = i32x16::load_array(simd, bits);
-            let (x, y) = (left + (bits & (BLOCK_PX - 1)), top + (bits >> 3));
-            let (column, row) = (x - grid.window.left, y - grid.window.top);
-            let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
-            let places = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
-            let (x, y): (f32x16<S>, f32x16<S>) = ((x - anchor_x).to_float(), (y - anchor_y).to_float());
-            let depth = (depth_plane.value + Wide::from_f32(y) * depth_plane.dy) + Wide::from_f32(x) * depth_plane.dx;
-            // Adding zero turns -0 into 0.
-            let depth = depth.to_f32().max(least).min(greatest) + 0.0;
-            let light = match &normal_planes {
-                None => steady_light,
-                Some([nx, ny, nz]) => light(simd, [at(nx, x, y), at(ny, x, y), at(nz, x, y)]),
-            };
-            let (places, depth, light): ([i32; LANES], [f32; LANES], [f32; LANES]) =
-                (places.into(), depth.into(), light.into());
-            // Without a branch that depends on when a lane is done, which would often be mispredicted.
-            let mut lanes = active;
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize % LANES;
-                lanes &= lanes - 1;
-                covered[lane] &= covered[lane] - 1;
-                active &= !(u32::from(covered[lane] == 0) << lane);
-                let place = next[lane];
-                next[lane] += 1;
-                new_places[place] = places[lane] as u32;
-                new_fragments[place] = SmallFragment {
-                    depth: depth[lane],
-                    light: light[lane],
-                    primitive: primitives[lane],
-                    draw: draw_number,
+        let mut start = 0;
+        for half in 0..2 {
+            while start < ends[half] {
+                let (lanes, bits) = samples.from(simd, start);
+                let lookup = Lookup::new(simd, lanes);
+                let (across, down) = (bits & (BLOCK_PX - 1), bits >> 3);
+                let column = lookup.ints(places[0][half]) + across;
+                let row = lookup.ints(places[1][half]) + down;
+                let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
+                let place: u32x8<S> = ((tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last)).bitcast();
+                let x: f32x8<S> = (lookup.ints(from_anchor[0][half]) + across).to_float();
+                let y: f32x8<S> = (lookup.ints(from_anchor[1][half]) + down).to_float();
+                let [value, dx, dy] = [0, 1, 2].map(|i: usize| lookup.wide(depth_plane[i][half]));
+                let depth = narrow((value + widen(y) * dy) + widen(x) * dx);
+                let [least, greatest] = [0, 1].map(|i: usize| lookup.floats(depth_range[i][half]));
+                // Adding zero turns -0 into 0.
+                let depth = depth.max(least).min(greatest) + 0.0;
+                let light = match &normal_planes {
+                    None => lookup.floats(steady_light[half]),
+                    Some(planes) => {
+                        let axis = |i: usize| {
+                            let [value, dx, dy] = [0, 1, 2].map(|j: usize| lookup.floats(planes[i][j][half]));
+                            (value + dy * y) + dx * x
+                        };
+                        light(simd, [axis(0), axis(1), axis(2)])
+                    }
                 };
+                let primitive: u32x8<S> = lookup.ints(primitives[half]).bitcast();
+                let range = start..start + HALF;
+                place.store_slice(&mut new_places[range.clone()]);
+                let (depth, light) = (depth.bitcast::<u32x8<S>>().split(), light.bitcast::<u32x8<S>>().split());
+                let (primitive, draws) = (primitive.split(), draw_numbers.split());
+                let to: &mut [u32] = bytemuck::cast_slice_mut(&mut new_fragments[range]);
+                let (low, high) = to.split_at_mut(LANES);
+                u32x4::store_four_interleaved([depth.0, light.0, primitive.0, draws.0], low);
+                u32x4::store_four_interleaved([depth.1, light.1, primitive.1, draws.1], high);
+                start += HALF;
             }
+            start = ends[half];
         }
+    }
+}
+
+/// Lanes of which each half of the triangles is one.
+const HALF: usize = LANES / 2;
+
+/// Samples that sixteen triangles cover, triangle by triangle.
+#[derive(Debug)]
+struct Samples {
+    /// Bit of the block, above it the lane.
+    numbers: [u16; LANES * 64 + HALF],
+    count: usize,
+}
+
+impl Default for Samples {
+    fn default() -> Self {
+        Self { numbers: [0; LANES * 64 + HALF], count: 0 }
+    }
+}
+
+/// Samples put down without looking whether there are as many.
+const WITHOUT_A_LOOK: usize = 4;
+
+impl Samples {
+    #[inline(always)]
+    fn add(&mut self, lane: usize, covered: u64) {
+        let tag = (lane << 6) as u16;
+        let mut bits = covered;
+        let numbers = &mut self.numbers[self.count..];
+        for number in &mut numbers[..WITHOUT_A_LOOK] {
+            *number = bits.trailing_zeros() as u16 | tag;
+            bits &= bits.wrapping_sub(1);
+        }
+        let mut at = WITHOUT_A_LOOK;
+        while bits != 0 {
+            numbers[at] = bits.trailing_zeros() as u16 | tag;
+            bits &= bits - 1;
+            at += 1;
+        }
+        self.count += covered.count_ones() as usize;
+    }
+
+    /// Lanes and bits of eight.
+    #[inline(always)]
+    fn from<S: Simd>(&self, simd: S, start: usize) -> (u32x8<S>, i32x8<S>) {
+        let (low, high) = u16x8::from_slice(simd, &self.numbers[start..start + HALF]).widen();
+        let numbers: u32x8<S> = low.combine(high);
+        (numbers >> 6, (numbers & 63).bitcast())
     }
 }
 
@@ -273,11 +337,6 @@ fn normal_plane<S: Simd>(
 ) -> [f32x16<S>; 3] {
     let (to_b, to_c) = (b - a, c - a);
     [a + (to_b * second[0] + to_c * third[0]), to_b * second[1] + to_c * third[1], to_b * second[2] + to_c * third[2]]
-}
-
-#[inline(always)]
-fn at<S: Simd>([value, dx, dy]: &[f32x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
-    (*value + *dy * y) + *dx * x
 }
 
 /// The geometric normal of a triangle.
@@ -359,15 +418,16 @@ pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element;
 impl NewFragments {
     /// Adds so many: their places and they themselves, to be written.
     #[inline(always)]
-    fn add(&mut self, count: usize) -> (&mut [u32], &mut [SmallFragment]) {
+    fn add(&mut self, count: usize, beyond: usize) -> (&mut [u32], &mut [SmallFragment]) {
         let first = self.count;
         self.count += count;
-        if self.places.len() < self.count {
-            let room = self.count.next_power_of_two().max(1024);
+        let end = self.count + beyond;
+        if self.places.len() < end {
+            let room = end.next_power_of_two().max(1024);
             self.places.resize(room, 0);
             self.fragments.resize(room, SmallFragment::default());
         }
-        (&mut self.places[first..self.count], &mut self.fragments[first..self.count])
+        (&mut self.places[first..end], &mut self.fragments[first..end])
     }
 
     /// Bytes held.

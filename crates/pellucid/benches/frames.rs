@@ -11,7 +11,7 @@ mod common;
 use std::io::stdin;
 
 use common::{Case, SCENES, case};
-use pellucid::{Renderer, Resolve};
+use pellucid::{Canvas, Renderer, Resolve};
 
 /// Frames of a case, but for those of a billion fragments.
 const FRAMES: usize = 25;
@@ -37,13 +37,14 @@ fn main() {
 fn render_on_request() {
     let loaded: Vec<_> = common::wanted(SCENES).iter().map(Case::load).collect();
     let renderer = Renderer::new();
+    let mut canvas = Canvas::new();
     for line in stdin().lines().map_while(Result::ok) {
         let Some((scene, view)) = line.trim().parse().ok().and_then(|number: usize| loaded.get(number)) else {
             println!("{line:?} is not the number of a scene: there are {}", loaded.len());
             continue;
         };
-        match renderer.render(scene, view, Resolve::Blend) {
-            Ok(frame) => println!("{}", frame.stats.total_ms),
+        match renderer.render_into(scene, view, Resolve::Blend, &mut canvas) {
+            Ok(stats) => println!("{}", stats.total_ms),
             Err(error) => println!("{error}"),
         }
     }
@@ -52,11 +53,12 @@ fn render_on_request() {
 fn measure(case: &Case, frames: usize) {
     let (scene, view) = case.load();
     let renderer = Renderer::new();
+    let mut canvas = Canvas::new();
     // The first frame allocates.
     let mut all = Vec::new();
     for _ in 0..=frames {
-        match renderer.render(&scene, &view, Resolve::Blend) {
-            Ok(frame) => all.push(frame.stats),
+        match renderer.render_into(&scene, &view, Resolve::Blend, &mut canvas) {
+            Ok(stats) => all.push(stats),
             Err(error) => return println!("{:<20} {error}", case.name),
         }
     }

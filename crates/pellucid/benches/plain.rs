@@ -20,7 +20,7 @@ use pellucid::core::pixel_grid::{
 };
 use pellucid::core::primitive::{Draw, draws, transform_point};
 use pellucid::core::view::Shading;
-use pellucid::{Image, Renderer, Resolve, Scene, View};
+use pellucid::{Canvas, Image, Renderer, Resolve, Scene, View};
 use rayon::prelude::*;
 
 /// Frames of each renderer.
@@ -47,6 +47,7 @@ fn main() {
 fn measure(case: &Case) {
     let (scene, view) = case.load();
     let renderer = Renderer::new();
+    let mut canvas = Canvas::new();
     let mut plain = PlainRenderer::new(&view);
     if let Err(why) = check(&scene, &view, &renderer, &mut plain) {
         return println!("{:<20} {why}", case.name);
@@ -57,10 +58,10 @@ fn measure(case: &Case) {
         let start = Instant::now();
         let drawn = plain.render(&scene, &view);
         plain_ms.push(start.elapsed().as_secs_f64() * 1e3);
-        match (drawn, renderer.render(&scene, &view, Resolve::Blend)) {
-            (Ok(()), Ok(frame)) => {
-                fragments = frame.stats.fragments;
-                pellucid_ms.push(frame.stats.total_ms);
+        match (drawn, renderer.render_into(&scene, &view, Resolve::Blend, &mut canvas)) {
+            (Ok(()), Ok(stats)) => {
+                fragments = stats.fragments;
+                pellucid_ms.push(stats.total_ms);
             }
             (Err(error), _) => return println!("{:<20} {error}", case.name),
             (_, Err(error)) => return println!("{:<20} {error}", case.name),

@@ -13,7 +13,7 @@ use common::{SCENES, case};
 use fearless_simd::{Level, Simd, SimdBase, SimdNarrow, SimdSplit, dispatch, f32x8, f64x8, u32x8};
 use glam::Vec4;
 use pellucid::{Resolve, Scene, Stats, View};
-use pellucid_cpu::{CpuRenderer, simd};
+use pellucid_cpu::{Canvas, CpuRenderer, simd};
 
 /// What a machine can do at best, on all its cores together.
 struct Peaks {
@@ -278,9 +278,9 @@ fn blend<S: Simd>(simd: S, room: &Room) -> f64 {
 
 /// The figures of the median of so many frames, after one that allocates.
 fn median(renderer: &CpuRenderer, scene: &Scene, view: &View, frames: usize) -> Stats {
+    let mut canvas = Canvas::new();
     let mut all: Vec<Stats> = (0..=frames)
-        .filter_map(|_| renderer.render(scene, view, Resolve::Blend).ok())
-        .map(|frame| frame.stats)
+        .filter_map(|_| renderer.render_into(scene, view, Resolve::Blend, &mut canvas).ok())
         .skip(1)
         .collect();
     all.sort_by(|a, b| a.total_ms.total_cmp(&b.total_ms));

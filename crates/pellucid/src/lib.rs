@@ -26,7 +26,7 @@ pub use pellucid_core::{
     AlphaMode, Camera, Fragment, Frame, Image, Instance, Layers, Material, Mesh, Projection, Resolve, Scene, Shading,
     Stats, Technique, Texture, View,
 };
-pub use pellucid_cpu::fbuffer;
+pub use pellucid_cpu::{Canvas, fbuffer};
 #[cfg(feature = "gpu")]
 pub use pellucid_gpu as gpu;
 pub use pellucid_scene::builtin;

@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use pellucid_core::{Frame, Layers, Resolve, Scene, Stats, Technique, View, oracle};
-use pellucid_cpu::CpuRenderer;
+use pellucid_cpu::{Canvas, CpuRenderer};
 #[cfg(feature = "gpu")]
 use pellucid_gpu::{ContextOptions, GpuRenderer, Storage};
 
@@ -106,6 +106,26 @@ impl Renderer {
             #[cfg(not(feature = "gpu"))]
             technique => return Err(Error::NoGpu(technique)),
         })
+    }
+
+    /// Renders into a picture that is kept from frame to frame, for turntables and windows: the CPU renderer then leaves alone
+    /// what was the background and still is.
+    ///
+    /// # Errors
+    /// As [`Self::render`]; the canvas then has the picture it had.
+    pub fn render_into(
+        &self,
+        scene: &Scene,
+        view: &View,
+        resolve: Resolve,
+        canvas: &mut Canvas,
+    ) -> Result<Stats, Error> {
+        if self.technique == Technique::Cpu {
+            return Ok(self.cpu.render_into(scene, view, resolve, canvas)?);
+        }
+        let frame = self.render(scene, view, resolve)?;
+        canvas.put(frame.image);
+        Ok(frame.stats)
     }
 
     /// Hands out the ordered layers behind every pixel, one rectangle of the picture at a time, for a resolve of one's

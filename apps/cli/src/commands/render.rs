@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use pellucid::core::heat_map;
-use pellucid::{Camera, Frame, Renderer, Resolve, Scene, Stats, View, files};
+use pellucid::{Camera, Canvas, Renderer, Resolve, Scene, Stats, View, files};
 
 use crate::commands::{multi_pass, warn_about, warn_about_cut, warn_about_dropped};
 use crate::plan::{Opened, RenderPlan, StatsTarget};
@@ -53,7 +53,7 @@ struct Job<'a> {
 impl Job<'_> {
     fn picture(&self, view: &View) -> anyhow::Result<()> {
         self.progress.stage("rendering");
-        let stats = self.render_to(&self.plan.output, view)?;
+        let stats = self.render_to(&self.plan.output, view, &mut Canvas::new())?;
         if let Some(target) = &self.plan.stats {
             report::write(&report::single(&self.run_of(&stats), &Figures::from(&stats))?, target)?;
         }
@@ -68,12 +68,13 @@ impl Job<'_> {
     fn turntable(&self, view: &View, count: u32) -> anyhow::Result<()> {
         let cameras = cameras_around(&view.camera, count)?;
         let mut pictures: Vec<(String, Figures)> = Vec::new();
+        let mut canvas = Canvas::new();
         let mut last = None;
         let mut total_ms = 0.0;
         for (number, camera) in (1..).zip(cameras) {
             let path = numbered(&self.plan.output, number);
             self.progress.stage("rendering");
-            let mut result = self.render_to(&path, &View { camera, ..view.clone() });
+            let mut result = self.render_to(&path, &View { camera, ..view.clone() }, &mut canvas);
             if number > 1 {
                 result = result.with_context(|| format!("stopped at picture {number}; those before it are whole"));
             }
@@ -103,18 +104,20 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Renders a picture into a file.
-    fn render_to(&self, path: &Path, view: &View) -> anyhow::Result<Stats> {
-        let Frame { mut image, stats } = self.renderer.render(self.scene, view, self.plan.resolve)?;
+    /// Renders a picture into a file, by way of a canvas.
+    fn render_to(&self, path: &Path, view: &View, canvas: &mut Canvas) -> anyhow::Result<Stats> {
+        let stats = self.renderer.render_into(self.scene, view, self.plan.resolve, canvas)?;
         if let Resolve::Complexity(asked) = self.plan.resolve {
+            let mut image = std::mem::take(canvas).into_image();
             let full_scale = heat_map::full_scale(asked, stats.max_depth_complexity);
             if !legend::draw(&mut image, legend::FRAGMENTS, full_scale, stats.max_depth_complexity > full_scale) {
                 let scale = format!("{}: too small for a legend; the scale is {}", path.display(), words(full_scale));
                 self.say(|| terminal::note(&scale));
             }
+            canvas.put(image);
         }
         self.progress.stage("writing");
-        pellucid::save(&image, path)?;
+        pellucid::save(canvas.image(), path)?;
         Ok(stats)
     }
 

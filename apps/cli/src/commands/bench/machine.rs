@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pellucid::core::fbuffer::Size;
 use pellucid::gpu::{Context, ContextOptions, GpuError, GpuRenderer, Storage};
 use pellucid::multi_pass::{self, GpuMultiPass, Through};
-use pellucid::{Error, Renderer, Resolve, Scene, Stats, Technique, View};
+use pellucid::{Canvas, Error, Renderer, Resolve, Scene, Stats, Technique, View};
 use serde::{Deserialize, Serialize};
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
@@ -21,7 +21,7 @@ pub(super) struct Machine {
     backend: Backend,
     threads: usize,
     budget_bytes: Option<u64>,
-    cpu: BTreeMap<usize, Renderer>,
+    cpu: BTreeMap<usize, (Renderer, Canvas)>,
     /// Or why there is none.
     gpu: Result<Gpu, String>,
 }
@@ -94,8 +94,9 @@ impl Machine {
             return Ok(self.gpu_for(variant)?.render(scene, view, Resolve::Blend, variant.technique)?.stats.into());
         }
         let threads = variant.threads.unwrap_or(self.threads);
-        let cpu = self.cpu.entry(threads).or_insert_with(|| Renderer::new().threads(threads));
-        Ok(cpu.render(scene, view, Resolve::Blend)?.stats.into())
+        let fresh = || (Renderer::new().threads(threads), Canvas::new());
+        let (cpu, canvas) = self.cpu.entry(threads).or_insert_with(fresh);
+        Ok(cpu.render_into(scene, view, Resolve::Blend, canvas)?.into())
     }
 
     /// Pixels at which a depth filter leaves the finished picture other than one of fragments that are all sorted; `None`
