@@ -49,9 +49,9 @@ impl Sight {
     #[inline(always)]
     pub(crate) fn new<S: Simd>(simd: S, corners: &[[[i32; 2]; LANES]; 3], draw: &Draw<'_>, grid: &TileGrid) -> Self {
         let zero = i32x16::splat(simd, 0);
-        let (ax, ay): (i32x16<S>, i32x16<S>) = load_pairs(simd, &corners[0]);
-        let (bx, by): (i32x16<S>, i32x16<S>) = load_pairs(simd, &corners[1]);
-        let (cx, cy): (i32x16<S>, i32x16<S>) = load_pairs(simd, &corners[2]);
+        let [ax, ay]: [i32x16<S>; 2] = load_pairs(simd, &corners[0]);
+        let [bx, by]: [i32x16<S>; 2] = load_pairs(simd, &corners[1]);
+        let [cx, cy]: [i32x16<S>; 2] = load_pairs(simd, &corners[2]);
         let outside = ax.simd_eq(OUTSIDE) | bx.simd_eq(OUTSIDE) | cx.simd_eq(OUTSIDE);
         let (min_x, min_y) = (ax.min(bx).min(cx), ay.min(by).min(cy));
         let (max_x, max_y) = (ax.max(bx).max(cx), ay.max(by).max(cy));

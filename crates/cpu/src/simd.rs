@@ -1,13 +1,11 @@
 //! The SIMD levels there are. The picture is the same at any of them: no operation is used whose result differs between
 //! levels (no fused multiply-add, no approximations), and none that depends on the number of lanes.
 
-use std::ops::{Add, Div, Mul, Sub};
-
 pub use fearless_simd::Level;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 use fearless_simd::{Avx2, SimdInto};
-use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdNarrow, SimdSplit, SimdWiden};
-use fearless_simd::{f32x8, f32x16, f64x8, i32x8, i32x16, u32x8, u32x16};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdNarrow, SimdSplit, SimdWiden};
+use fearless_simd::{f32x8, f64x8, i32x8, u32x8, u32x16};
 use pellucid_core::shading::AMBIENT;
 #[cfg(target_arch = "x86")]
 use std::arch::x86::_mm256_permutevar8x32_epi32;
@@ -31,86 +29,6 @@ pub fn levels() -> Vec<(&'static str, Level)> {
         levels.push(("best", best));
     }
     levels
-}
-
-/// Sixteen numbers in f64: what planes are made of.
-#[derive(Clone, Copy)]
-pub(crate) struct Wide<S: Simd>(f64x8<S>, f64x8<S>);
-
-impl<S: Simd> Wide<S> {
-    #[inline(always)]
-    pub(crate) fn splat(simd: S, value: f64) -> Self {
-        Self(f64x8::splat(simd, value), f64x8::splat(simd, value))
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_f32(values: f32x16<S>) -> Self {
-        let (low, high) = values.widen();
-        Self(low, high)
-    }
-
-    #[inline(always)]
-    pub(crate) fn from_int(values: i32x16<S>) -> Self {
-        let (low, high) = values.widen();
-        Self(low.to_float(), high.to_float())
-    }
-
-    /// From integers below 2^24, which f32 holds exactly.
-    #[inline(always)]
-    pub(crate) fn from_small_int(values: i32x16<S>) -> Self {
-        Self::from_f32(values.to_float())
-    }
-
-    /// Lower and upper words, of the first eight and the second eight.
-    #[inline(always)]
-    pub(crate) fn words(self) -> [[u32x8<S>; 2]; 2] {
-        [self.0, self.1].map(|half| {
-            let (low, high) = half.bitcast::<u32x16<S>>().split();
-            low.deinterleave(high).into()
-        })
-    }
-
-    /// Rounded to nearest.
-    #[inline(always)]
-    pub(crate) fn to_f32(self) -> f32x16<S> {
-        self.0.narrow(self.1)
-    }
-}
-
-impl<S: Simd> Add for Wide<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0, self.1 + other.1)
-    }
-}
-
-impl<S: Simd> Sub for Wide<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0, self.1 - other.1)
-    }
-}
-
-impl<S: Simd> Mul for Wide<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(self.0 * other.0, self.1 * other.1)
-    }
-}
-
-impl<S: Simd> Div for Wide<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(self.0 / other.0, self.1 / other.1)
-    }
 }
 
 /// Brightness of surfaces with these normals in camera space: [`pellucid_core::shading::light`], operation by operation.
@@ -137,6 +55,13 @@ pub(crate) fn widen<S: Simd>(values: f32x8<S>) -> f64x8<S> {
 pub(crate) fn narrow<S: Simd>(values: f64x8<S>) -> f32x8<S> {
     let (low, high) = values.split();
     low.narrow(high)
+}
+
+/// The lower and the upper words of eight numbers.
+#[inline(always)]
+pub(crate) fn words<S: Simd>(values: f64x8<S>) -> [u32x8<S>; 2] {
+    let (low, high) = values.bitcast::<u32x16<S>>().split();
+    low.deinterleave(high).into()
 }
 
 /// Which one of eight numbers each lane gets.

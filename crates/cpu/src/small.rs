@@ -1,4 +1,4 @@
-//! Small triangles to fragments, sixteen triangles at a time.
+//! Small triangles to fragments, as soon as sixteen wait.
 //!
 //! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up, eight at
 //! a time, of as many triangles as that takes. All that is left for the tile is to order and blend them. A triangle that
@@ -8,14 +8,14 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{
     Bytes, Level, Simd, SimdBase, SimdCombine, SimdInt, SimdInterleaved, SimdSplit, SimdWiden, dispatch,
 };
-use fearless_simd::{f32x8, f32x16, i32x8, i32x16, u16x8, u32x4, u32x8};
+use fearless_simd::{f32x8, f64x4, f64x8, i32x8, u16x8, u32x4, u32x8};
 use glam::Vec3;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 use prefetch_index::prefetch_index;
 
 use crate::bin::{TILE_PX, TileGrid};
-use crate::simd::{Lookup, Wide, light, narrow, widen};
+use crate::simd::{Lookup, light, narrow, widen, words};
 use crate::transform::DrawVertices;
 
 pub(crate) const LANES: usize = 16;
@@ -74,7 +74,7 @@ pub(crate) struct SmallTriangles {
     top: [i32; LANES],
     /// ... and which ones of it are covered, row by row.
     covered: [u64; LANES],
-    /// All samples that the sixteen cover.
+    /// What eight of them cover.
     samples: Samples,
 }
 
@@ -117,166 +117,198 @@ impl SmallTriangles {
         grid: &TileGrid,
         fragments: &mut NewFragments,
     ) {
-        let triangle_count = std::mem::take(&mut self.count);
-        if triangle_count == 0 {
-            return;
+        let count = std::mem::take(&mut self.count);
+        for first in (0..count).step_by(EIGHT) {
+            let triangles = Triangles::new(simd, self, first, draw, vertices);
+            self.samples.put_down(&self.covered[first..count.min(first + EIGHT)]);
+            let (new_places, new_fragments) = fragments.add(self.samples.count, EIGHT);
+            let samples = self.samples.numbers[..self.samples.count.next_multiple_of(EIGHT)].as_chunks().0;
+            let room = new_places.chunks_exact_mut(EIGHT).zip(new_fragments.chunks_exact_mut(EIGHT));
+            for (samples, (places, fragments)) in samples.iter().zip(room) {
+                triangles.make_fragments(simd, samples, draw_number, grid, places, fragments);
+            }
         }
-        // The planes of weights and of depth, as `ScreenTriangle` has them.
-        // Lanes without a triangle have corners of another, which do no harm.
-        let corners = &self.corners;
-        let a: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 0, vertices.positions);
-        let b: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 1, vertices.positions);
-        let c: (i32x16<S>, i32x16<S>) = gather_pairs(simd, corners, 2, vertices.positions);
-        let (anchor_x, anchor_y) = (a.0 >> 8, a.1 >> 8);
-        let anchor = ((anchor_x << 8) + center(0), (anchor_y << 8) + center(0));
-        let area = (b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1);
-        let inv_area = Wide::splat(simd, 1.0) / Wide::from_small_int(area);
-        let second = WidePlane::weight(simd, c, a, anchor, inv_area);
-        let third = WidePlane::weight(simd, a, b, anchor, inv_area);
-        let (a_z, a_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 0, vertices.depths);
-        let (b_z, b_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 1, vertices.depths);
-        let (c_z, c_inv_w): (f32x16<S>, f32x16<S>) = gather_pairs(simd, corners, 2, vertices.depths);
-        let (least, greatest) = (a_z.min(b_z).min(c_z), a_z.max(b_z).max(c_z));
-        let first_z = Wide::from_f32(a_z);
-        let (to_second, to_third) = (Wide::from_f32(b_z) - first_z, Wide::from_f32(c_z) - first_z);
-        let depth_plane = WidePlane {
-            value: first_z + (second.value * to_second + third.value * to_third),
-            dx: second.dx * to_second + third.dx * to_third,
-            dy: second.dy * to_second + third.dy * to_third,
-        };
+    }
+}
 
-        let mut steady_light = f32x16::splat(simd, 1.0);
-        let mut normal_planes = None;
+/// Triangles, or blocks of them, whose fragments are made together: one to a lane.
+const EIGHT: usize = 8;
+
+/// What fragments of eight triangles are made of.
+struct Triangles<S: Simd> {
+    /// Column and row of the block's first sample.
+    first: [i32x8<S>; 2],
+    /// Column and row of the triangle's anchor.
+    anchor: [i32x8<S>; 2],
+    depth: Plane<[u32x8<S>; 2]>,
+    least_depth: f32x8<S>,
+    greatest_depth: f32x8<S>,
+    /// One for each axis; `None` if the normal is the same everywhere ...
+    normal: Option<[Plane<f32x8<S>>; 3]>,
+    /// ... and so is the brightness.
+    steady_light: f32x8<S>,
+    primitive: u32x8<S>,
+}
+
+/// What grows by the same from pixel to pixel.
+#[derive(Clone, Copy)]
+struct Plane<T> {
+    /// At the anchor.
+    value: T,
+    dx: T,
+    dy: T,
+}
+
+impl<S: Simd> Triangles<S> {
+    /// Those from number `first` on; where there are fewer than eight, others that were there before.
+    #[inline(always)]
+    fn new(simd: S, all: &SmallTriangles, first: usize, draw: &Draw<'_>, vertices: DrawVertices<'_>) -> Self {
+        let corners: &[[u32; 3]; EIGHT] = eight(&all.corners, first);
+        let numbers: &[u32; EIGHT] = eight(&all.triangles, first);
+        // All of one length, so that a corner is known to be in each if it is in one.
+        let count = draw.mesh.positions().len();
+        let (positions, depths) = (&vertices.positions[..count], &vertices.depths[..count]);
+        // The planes of weights and of depth, as `ScreenTriangle` has them.
+        let a: [i32x8<S>; 2] = gather_pairs(simd, corners, 0, positions);
+        let b: [i32x8<S>; 2] = gather_pairs(simd, corners, 1, positions);
+        let c: [i32x8<S>; 2] = gather_pairs(simd, corners, 2, positions);
+        let anchor = [a[0] >> 8, a[1] >> 8];
+        let at = [(anchor[0] << 8) + center(0), (anchor[1] << 8) + center(0)];
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        let inv_area = f64x8::splat(simd, 1.0) / wide(area);
+        let second = weight_plane(simd, c, a, at, inv_area);
+        let third = weight_plane(simd, a, b, at, inv_area);
+        let [a_z, a_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 0, depths);
+        let [b_z, b_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 1, depths);
+        let [c_z, c_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 2, depths);
+        let first_z = widen(a_z);
+        let (to_second, to_third) = (widen(b_z) - first_z, widen(c_z) - first_z);
+
+        let mut steady_light = f32x8::splat(simd, 1.0);
+        let mut normal = None;
         if draw.lit
             && let Some(normals) = draw.mesh.normals()
         {
+            let normals = &normals[..count];
             let a = in_view(draw, gather(simd, |lane| normals[corners[lane][0] as usize]));
             let b = in_view(draw, gather(simd, |lane| normals[corners[lane][1] as usize]));
             let c = in_view(draw, gather(simd, |lane| normals[corners[lane][2] as usize]));
-            let weights = [second.to_f32(), third.to_f32()];
-            normal_planes = Some([
+            let weights = [narrow_plane(&second), narrow_plane(&third)];
+            normal = Some([
                 normal_plane(a[0] * a_inv_w, b[0] * b_inv_w, c[0] * c_inv_w, &weights),
                 normal_plane(a[1] * a_inv_w, b[1] * b_inv_w, c[1] * c_inv_w, &weights),
                 normal_plane(a[2] * a_inv_w, b[2] * b_inv_w, c[2] * c_inv_w, &weights),
             ]);
         } else if draw.lit {
-            let normal = gather(simd, |lane| flat_normal(draw, self.triangles[lane]));
-            steady_light = light(simd, in_view(draw, normal));
+            steady_light = light(simd, in_view(draw, gather(simd, |lane| flat_normal(draw, numbers[lane]))));
         }
+        Self {
+            first: [&all.left, &all.top].map(|first_of_all| i32x8::load_array(simd, *eight(first_of_all, first))),
+            anchor,
+            depth: Plane {
+                value: words(first_z + (second.value * to_second + third.value * to_third)),
+                dx: words(second.dx * to_second + third.dx * to_third),
+                dy: words(second.dy * to_second + third.dy * to_third),
+            },
+            least_depth: a_z.min(b_z).min(c_z),
+            greatest_depth: a_z.max(b_z).max(c_z),
+            normal,
+            steady_light,
+            primitive: u32x8::load_array(simd, *numbers) + draw.first_primitive,
+        }
+    }
 
-        let samples = &mut self.samples;
-        samples.count = 0;
-        let mut ends = [0; 2];
-        for lane in 0..triangle_count {
-            samples.add(lane, self.covered[lane]);
-            ends[lane / HALF] = samples.count;
-        }
-        ends[1] = samples.count;
-        let (new_places, new_fragments) = fragments.add(samples.count, HALF);
-        let (left, top) = (i32x16::load_array(simd, self.left), i32x16::load_array(simd, self.top));
-        let primitives =
-            i32x16::load_array(simd, self.triangles.map(|triangle| (draw.first_primitive + triangle) as i32));
-        let places = [left - grid.window.left, top - grid.window.top];
-        let from_anchor = [left - anchor_x, top - anchor_y];
-        let halves = |values: f32x16<S>| <[f32x8<S>; 2]>::from(values.split());
-        let int_halves = |values: i32x16<S>| <[i32x8<S>; 2]>::from(values.split());
-        let places = places.map(int_halves);
-        let from_anchor = from_anchor.map(int_halves);
-        let depth_range = [least, greatest].map(halves);
-        let primitives = int_halves(primitives);
-        let steady_light = halves(steady_light);
-        let depth_plane = [depth_plane.value.words(), depth_plane.dx.words(), depth_plane.dy.words()];
-        let normal_planes = normal_planes.map(|planes| planes.map(|plane| plane.map(halves)));
-        let draw_numbers = u32x8::splat(simd, draw_number);
+    /// The fragments at eight samples.
+    #[inline(always)]
+    fn make_fragments(
+        &self,
+        simd: S,
+        samples: &[u16; EIGHT],
+        draw_number: u32,
+        grid: &TileGrid,
+        places: &mut [u32],
+        fragments: &mut [SmallFragment],
+    ) {
+        let (low, high) = u16x8::load_array_ref(simd, samples).widen();
+        let samples: u32x8<S> = low.combine(high);
+        let lookup = Lookup::new(simd, samples >> BLOCK_BITS);
+        let bit: i32x8<S> = (samples & ((1 << BLOCK_BITS) - 1)).bitcast();
+        let x = lookup.ints(self.first[0]) + (bit & (BLOCK_PX - 1));
+        let y = lookup.ints(self.first[1]) + (bit >> 3);
+
+        let (column, row) = (x - grid.window.left, y - grid.window.top);
+        let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
         let last = TILE_PX as i32 - 1;
-        let mut start = 0;
-        for half in 0..2 {
-            while start < ends[half] {
-                let (lanes, bits) = samples.from(simd, start);
-                let lookup = Lookup::new(simd, lanes);
-                let (across, down) = (bits & (BLOCK_PX - 1), bits >> 3);
-                let column = lookup.ints(places[0][half]) + across;
-                let row = lookup.ints(places[1][half]) + down;
-                let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
-                let place: u32x8<S> = ((tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last)).bitcast();
-                let x: f32x8<S> = (lookup.ints(from_anchor[0][half]) + across).to_float();
-                let y: f32x8<S> = (lookup.ints(from_anchor[1][half]) + down).to_float();
-                let [value, dx, dy] = [0, 1, 2].map(|i: usize| lookup.wide(depth_plane[i][half]));
-                let depth = narrow((value + widen(y) * dy) + widen(x) * dx);
-                let [least, greatest] = [0, 1].map(|i: usize| lookup.floats(depth_range[i][half]));
-                // Adding zero turns -0 into 0.
-                let depth = depth.max(least).min(greatest) + 0.0;
-                let light = match &normal_planes {
-                    None => lookup.floats(steady_light[half]),
-                    Some(planes) => {
-                        let axis = |i: usize| {
-                            let [value, dx, dy] = [0, 1, 2].map(|j: usize| lookup.floats(planes[i][j][half]));
-                            (value + dy * y) + dx * x
-                        };
-                        light(simd, [axis(0), axis(1), axis(2)])
-                    }
-                };
-                let primitive: u32x8<S> = lookup.ints(primitives[half]).bitcast();
-                let range = start..start + HALF;
-                place.store_slice(&mut new_places[range.clone()]);
-                let (depth, light) = (depth.bitcast::<u32x8<S>>().split(), light.bitcast::<u32x8<S>>().split());
-                let (primitive, draws) = (primitive.split(), draw_numbers.split());
-                let to: &mut [u32] = bytemuck::cast_slice_mut(&mut new_fragments[range]);
-                let (low, high) = to.split_at_mut(LANES);
-                u32x4::store_four_interleaved([depth.0, light.0, primitive.0, draws.0], low);
-                u32x4::store_four_interleaved([depth.1, light.1, primitive.1, draws.1], high);
-                start += HALF;
+        let place = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
+        place.bitcast::<u32x8<S>>().store_slice(places);
+
+        let x: f32x8<S> = (x - lookup.ints(self.anchor[0])).to_float();
+        let y: f32x8<S> = (y - lookup.ints(self.anchor[1])).to_float();
+        let (value, dx, dy) = (lookup.wide(self.depth.value), lookup.wide(self.depth.dx), lookup.wide(self.depth.dy));
+        let depth = narrow((value + widen(y) * dy) + widen(x) * dx);
+        let (least, greatest) = (lookup.floats(self.least_depth), lookup.floats(self.greatest_depth));
+        // Adding zero turns -0 into 0.
+        let depth = depth.max(least).min(greatest) + 0.0;
+        let light = match &self.normal {
+            None => lookup.floats(self.steady_light),
+            Some([nx, ny, nz]) => {
+                light(simd, [looked_up(&lookup, nx, x, y), looked_up(&lookup, ny, x, y), looked_up(&lookup, nz, x, y)])
             }
-            start = ends[half];
-        }
+        };
+        let (depth, light) = (depth.bitcast::<u32x8<S>>().split(), light.bitcast::<u32x8<S>>().split());
+        let (primitive, draw) = (lookup.words(self.primitive).split(), u32x4::splat(simd, draw_number));
+        let (first, second) = bytemuck::cast_slice_mut(fragments).split_at_mut(EIGHT / 2 * 4);
+        u32x4::store_four_interleaved([depth.0, light.0, primitive.0, draw], first);
+        u32x4::store_four_interleaved([depth.1, light.1, primitive.1, draw], second);
     }
 }
 
-/// Lanes of which each half of the triangles is one.
-const HALF: usize = LANES / 2;
+/// Eight in a row.
+#[inline(always)]
+fn eight<T>(all: &[T; LANES], first: usize) -> &[T; EIGHT] {
+    &all.as_chunks().0[first / EIGHT]
+}
 
-/// Samples that sixteen triangles cover, triangle by triangle.
+/// Bits of a sample's number in its block.
+const BLOCK_BITS: u32 = 6;
+
+/// Samples that eight triangles cover, triangle by triangle.
 #[derive(Debug)]
 struct Samples {
-    /// Bit of the block, above it the lane.
-    numbers: [u16; LANES * 64 + HALF],
+    /// Number in the block, above it the triangle's lane; beyond `count` anything.
+    numbers: [u16; EIGHT << BLOCK_BITS],
     count: usize,
 }
 
 impl Default for Samples {
     fn default() -> Self {
-        Self { numbers: [0; LANES * 64 + HALF], count: 0 }
+        Self { numbers: [0; EIGHT << BLOCK_BITS], count: 0 }
     }
 }
 
-/// Samples put down without looking whether there are as many.
-const WITHOUT_A_LOOK: usize = 4;
+/// Samples of a triangle that are put down without asking whether there are as many: what asks is often mispredicted.
+const WITHOUT_ASKING: usize = 4;
 
 impl Samples {
+    /// Puts down which samples are covered.
     #[inline(always)]
-    fn add(&mut self, lane: usize, covered: u64) {
-        let tag = (lane << 6) as u16;
-        let mut bits = covered;
-        let numbers = &mut self.numbers[self.count..];
-        for number in &mut numbers[..WITHOUT_A_LOOK] {
-            *number = bits.trailing_zeros() as u16 | tag;
-            bits &= bits.wrapping_sub(1);
+    fn put_down(&mut self, covered: &[u64]) {
+        self.count = 0;
+        for (lane, &covered) in covered.iter().enumerate() {
+            let lane = (lane << BLOCK_BITS) as u16;
+            let mut bits = covered;
+            let mut at = self.count;
+            for number in &mut self.numbers[at..at + WITHOUT_ASKING] {
+                *number = lane | (bits.trailing_zeros() as u16 & ((1 << BLOCK_BITS) - 1));
+                bits &= bits.wrapping_sub(1);
+            }
+            while bits != 0 {
+                self.numbers[at + WITHOUT_ASKING] = lane | bits.trailing_zeros() as u16;
+                bits &= bits - 1;
+                at += 1;
+            }
+            self.count += covered.count_ones() as usize;
         }
-        let mut at = WITHOUT_A_LOOK;
-        while bits != 0 {
-            numbers[at] = bits.trailing_zeros() as u16 | tag;
-            bits &= bits - 1;
-            at += 1;
-        }
-        self.count += covered.count_ones() as usize;
-    }
-
-    /// Lanes and bits of eight.
-    #[inline(always)]
-    fn from<S: Simd>(&self, simd: S, start: usize) -> (u32x8<S>, i32x8<S>) {
-        let (low, high) = u16x8::from_slice(simd, &self.numbers[start..start + HALF]).widen();
-        let numbers: u32x8<S> = low.combine(high);
-        (numbers >> 6, (numbers & 63).bitcast())
     }
 }
 
@@ -295,48 +327,57 @@ pub(crate) fn fetch(corners: [u32; 3], draw: &Draw<'_>, vertices: DrawVertices<'
     }
 }
 
-/// A plane for each of sixteen triangles.
-struct WidePlane<S: Simd> {
-    value: Wide<S>,
-    dx: Wide<S>,
-    dy: Wide<S>,
-}
-
-impl<S: Simd> WidePlane<S> {
-    /// Of the weight that an edge's opposite corner has.
-    #[inline(always)]
-    fn weight(
-        simd: S,
-        (from_x, from_y): (i32x16<S>, i32x16<S>),
-        (to_x, to_y): (i32x16<S>, i32x16<S>),
-        (x, y): (i32x16<S>, i32x16<S>),
-        inv_area: Wide<S>,
-    ) -> Self {
-        let (a, b) = (from_y - to_y, to_x - from_x);
-        let step = Wide::splat(simd, f64::from(SUBPIXELS)) * inv_area;
-        Self {
-            value: Wide::from_int(a * (x - from_x) + b * (y - from_y)) * inv_area,
-            dx: Wide::from_small_int(a) * step,
-            dy: Wide::from_small_int(b) * step,
-        }
-    }
-
-    #[inline(always)]
-    fn to_f32(&self) -> [f32x16<S>; 3] {
-        [self.value.to_f32(), self.dx.to_f32(), self.dy.to_f32()]
+/// The plane of the weight that an edge's opposite corner has.
+#[inline(always)]
+fn weight_plane<S: Simd>(
+    simd: S,
+    [from_x, from_y]: [i32x8<S>; 2],
+    [to_x, to_y]: [i32x8<S>; 2],
+    [x, y]: [i32x8<S>; 2],
+    inv_area: f64x8<S>,
+) -> Plane<f64x8<S>> {
+    let (a, b) = (from_y - to_y, to_x - from_x);
+    let step = f64x8::splat(simd, f64::from(SUBPIXELS)) * inv_area;
+    let (low, high) = (a * (x - from_x) + b * (y - from_y)).widen();
+    Plane {
+        value: low.to_float::<f64x4<S>>().combine(high.to_float::<f64x4<S>>()) * inv_area,
+        dx: wide(a) * step,
+        dy: wide(b) * step,
     }
 }
 
-/// One axis of a plane of normals: value at the anchor, change to the right, change downwards.
+/// In f64, integers below 2^24, which f32 holds exactly.
+#[inline(always)]
+fn wide<S: Simd>(values: i32x8<S>) -> f64x8<S> {
+    widen(values.to_float())
+}
+
+/// Rounded to nearest.
+#[inline(always)]
+fn narrow_plane<S: Simd>(plane: &Plane<f64x8<S>>) -> Plane<f32x8<S>> {
+    Plane { value: narrow(plane.value), dx: narrow(plane.dx), dy: narrow(plane.dy) }
+}
+
+/// The plane of one axis of a normal.
 #[inline(always)]
 fn normal_plane<S: Simd>(
-    a: f32x16<S>,
-    b: f32x16<S>,
-    c: f32x16<S>,
-    [second, third]: &[[f32x16<S>; 3]; 2],
-) -> [f32x16<S>; 3] {
+    a: f32x8<S>,
+    b: f32x8<S>,
+    c: f32x8<S>,
+    [second, third]: &[Plane<f32x8<S>>; 2],
+) -> Plane<f32x8<S>> {
     let (to_b, to_c) = (b - a, c - a);
-    [a + (to_b * second[0] + to_c * third[0]), to_b * second[1] + to_c * third[1], to_b * second[2] + to_c * third[2]]
+    Plane {
+        value: a + (to_b * second.value + to_c * third.value),
+        dx: to_b * second.dx + to_c * third.dx,
+        dy: to_b * second.dy + to_c * third.dy,
+    }
+}
+
+/// The value of a plane at pixels from the anchor.
+#[inline(always)]
+fn looked_up<S: Simd>(lookup: &Lookup<S>, plane: &Plane<f32x8<S>>, x: f32x8<S>, y: f32x8<S>) -> f32x8<S> {
+    (lookup.floats(plane.value) + lookup.floats(plane.dy) * y) + lookup.floats(plane.dx) * x
 }
 
 /// The geometric normal of a triangle.
@@ -354,35 +395,18 @@ fn unit(edge: Vec3) -> Vec3 {
 /// What there is for each lane. Written out, so that it goes to registers: vectors that are loaded from where their lanes
 /// have just been stored wait for it.
 #[inline(always)]
-fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; LANES] {
-    [
-        of(0),
-        of(1),
-        of(2),
-        of(3),
-        of(4),
-        of(5),
-        of(6),
-        of(7),
-        of(8),
-        of(9),
-        of(10),
-        of(11),
-        of(12),
-        of(13),
-        of(14),
-        of(15),
-    ]
+fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; EIGHT] {
+    [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
 }
 
-/// A vector for each of sixteen lanes, as structure of arrays.
+/// A vector for each of eight lanes, as structure of arrays.
 #[inline(always)]
-fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x16<S>; 3] {
+fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x8<S>; 3] {
     let vectors = each_lane(vector);
     [
-        f32x16::load_array(simd, each_lane(|lane| vectors[lane].x)),
-        f32x16::load_array(simd, each_lane(|lane| vectors[lane].y)),
-        f32x16::load_array(simd, each_lane(|lane| vectors[lane].z)),
+        f32x8::load_array(simd, each_lane(|lane| vectors[lane].x)),
+        f32x8::load_array(simd, each_lane(|lane| vectors[lane].y)),
+        f32x8::load_array(simd, each_lane(|lane| vectors[lane].z)),
     ]
 }
 
@@ -390,16 +414,16 @@ fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x16<S>; 3] {
 #[inline(always)]
 fn gather_pairs<S: Simd, V: SimdBase<S>>(
     simd: S,
-    corners: &[[u32; 3]; LANES],
+    corners: &[[u32; 3]; EIGHT],
     k: usize,
     from: &[[V::Element; 2]],
-) -> (V, V) {
+) -> [V; 2] {
     load_pairs(simd, &each_lane(|lane| from[corners[lane][k] as usize]))
 }
 
 /// Normals in camera space.
 #[inline(always)]
-fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
     let matrix = &draw.view_from_normal;
     [
         (x * matrix.x_axis.x + y * matrix.y_axis.x) + z * matrix.z_axis.x,
@@ -408,15 +432,15 @@ fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 3
     ]
 }
 
-/// Two arrays from one of pairs.
+/// Two vectors from one of pairs.
 #[inline(always)]
-pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>>(simd: S, pairs: &[[V::Element; 2]; LANES]) -> (V, V) {
-    let (low, high) = pairs.as_flattened().split_at(LANES);
-    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high))
+pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>, const N: usize>(simd: S, pairs: &[[V::Element; 2]; N]) -> [V; 2] {
+    let (low, high) = pairs.as_flattened().split_at(N);
+    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high)).into()
 }
 
 impl NewFragments {
-    /// Adds so many: their places and they themselves, to be written.
+    /// Adds so many: their places and they themselves, to be written, and `beyond` more that may be.
     #[inline(always)]
     fn add(&mut self, count: usize, beyond: usize) -> (&mut [u32], &mut [SmallFragment]) {
         let first = self.count;
