@@ -1,5 +1,5 @@
 //! Triangles to what tiles need: small ones to fragments, others to records; what is out of sight or covers no sample is
-//! left out, sixteen triangles at a time, before more than its position on the screen is read.
+//! left out, eight triangles at a time, before more than its position on the screen is read.
 
 use fearless_simd::Simd;
 use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, outcode, twice_signed_area};
@@ -79,7 +79,7 @@ impl SetupScratch {
 }
 
 /// Triangles between those at hand and those whose corners are fetched into the cache meanwhile.
-const FETCHED_AHEAD: usize = 2 * LANES;
+const FETCHED_AHEAD: usize = 4 * LANES;
 
 /// Triangles of one draw that a chunk sets up.
 #[derive(Debug, Clone)]
@@ -168,26 +168,28 @@ impl Chunk {
         grid: &TileGrid,
         new: &mut NewFragments,
     ) {
-        let triangles = &draw.mesh.triangles()[span.first..span.first + span.count];
-        let ahead = triangles.get(FETCHED_AHEAD..).unwrap_or_default().chunks(LANES).chain(std::iter::repeat(&[][..]));
+        let all = &draw.mesh.triangles()[span.first..span.first + span.count];
         let mut small = SmallTriangles::default();
-        let mut corners = [[[0; 2]; LANES]; 3];
-        for ((first, triangles), ahead) in (span.first..).step_by(LANES).zip(triangles.chunks(LANES)).zip(ahead) {
+        let mut sight = Sight::default();
+        for start in (0..all.len()).step_by(LANES) {
             // The other corners are mostly those of neighbours.
-            for &[vertex, ..] in ahead {
+            for &[vertex, ..] in all.iter().skip(start + FETCHED_AHEAD).take(LANES) {
                 prefetch_index(vertices.positions, vertex as usize);
             }
-            if triangles.len() < LANES {
-                // Triangles without area, which are never in sight.
-                corners = [[[0; 2]; LANES]; 3];
-            }
-            for (lane, indices) in triangles.iter().enumerate() {
-                for (corners, &vertex) in corners.iter_mut().zip(indices) {
-                    corners[lane] = vertices.positions[vertex as usize];
+            let padded;
+            let triangles = match all[start..].first_chunk::<LANES>() {
+                Some(triangles) => triangles,
+                None => {
+                    padded = padded_triangles(&all[start..]);
+                    &padded
                 }
-            }
-            let sight = Sight::new(simd, &corners, draw, grid);
+            };
+            let first = span.first + start;
+            sight.look(simd, triangles, vertices.positions, draw, grid);
             let mut records = sight.others;
+            if all.len() - start < LANES {
+                records &= (1 << (all.len() - start)) - 1;
+            }
             if draw.varies() {
                 records |= sight.small;
             } else {
@@ -333,6 +335,14 @@ impl Chunk {
             + self.opaque.bytes()
             + self.transparent.bytes()
     }
+}
+
+/// A few triangles, and others without area, which are never small and in sight.
+#[cold]
+fn padded_triangles(few: &[[u32; 3]]) -> [[u32; 3]; LANES] {
+    let mut padded = [[few[0][0]; 3]; LANES];
+    padded[..few.len()].copy_from_slice(few);
+    padded
 }
 
 /// Whether a triangle covers one pixel.

@@ -1,13 +1,13 @@
-//! What of sixteen triangles is in sight: bounds, sides and, of the small ones, every covered sample, in blocks of 8 x 8.
+//! What of eight triangles is in sight: bounds, sides and, of the small ones, every covered sample, in blocks of 8 x 8.
 
 use std::hint::black_box;
 
-use fearless_simd::{Select, Simd, SimdBase, SimdMask, i32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, i32x8};
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
 use crate::bin::TileGrid;
-use crate::small::{BLOCK_PX, LANES, MOST_FRAGMENTS, load_pairs};
+use crate::small::{BLOCK_PX, LANES, MOST_FRAGMENTS, gather_pairs};
 use crate::transform::OUTSIDE;
 
 /// A triangle less than so many subpixels wide and high is small: at most two blocks a side. Edge values then fit 32 bits
@@ -17,7 +17,8 @@ const SMALL_SUBPIXELS: i32 = 2 * BLOCK_PX * SUBPIXELS;
 /// Blocks of samples that a small triangle may reach.
 const BLOCKS: usize = 4;
 
-/// What is known of sixteen triangles; a bit for each in a mask.
+/// What is known of eight triangles; a bit for each in a mask.
+#[derive(Default)]
 pub(crate) struct Sight {
     /// Small ones that cover samples.
     pub(crate) small: u32,
@@ -35,7 +36,7 @@ pub(crate) struct Sight {
     blocks: [Block; BLOCKS],
 }
 
-/// A block of samples at the same place in the bounds of all sixteen triangles.
+/// A block of samples at the same place in the bounds of all eight triangles.
 #[derive(Clone, Copy, Default)]
 struct Block {
     /// From the first sample of the bounds.
@@ -46,12 +47,20 @@ struct Block {
 }
 
 impl Sight {
+    /// Looks at eight triangles of a draw.
     #[inline(always)]
-    pub(crate) fn new<S: Simd>(simd: S, corners: &[[[i32; 2]; LANES]; 3], draw: &Draw<'_>, grid: &TileGrid) -> Self {
-        let zero = i32x16::splat(simd, 0);
-        let [ax, ay]: [i32x16<S>; 2] = load_pairs(simd, &corners[0]);
-        let [bx, by]: [i32x16<S>; 2] = load_pairs(simd, &corners[1]);
-        let [cx, cy]: [i32x16<S>; 2] = load_pairs(simd, &corners[2]);
+    pub(crate) fn look<S: Simd>(
+        &mut self,
+        simd: S,
+        triangles: &[[u32; 3]; LANES],
+        positions: &[[i32; 2]],
+        draw: &Draw<'_>,
+        grid: &TileGrid,
+    ) {
+        let zero = i32x8::splat(simd, 0);
+        let [ax, ay]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 0, positions);
+        let [bx, by]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 1, positions);
+        let [cx, cy]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 2, positions);
         let outside = ax.simd_eq(OUTSIDE) | bx.simd_eq(OUTSIDE) | cx.simd_eq(OUTSIDE);
         let (min_x, min_y) = (ax.min(bx).min(cx), ay.min(by).min(cy));
         let (max_x, max_y) = (ax.max(bx).max(cx), ay.max(by).max(cy));
@@ -71,19 +80,15 @@ impl Sight {
         }
         // Whether a small one has samples to the right of the window or below it.
         let leaves_window = (leaves_window & small).any_true();
-        let mut sight = Self {
-            small: small.to_bitmask() as u32,
-            maybe_many: 0,
-            others: others.to_bitmask() as u32,
-            swapped: swapped.to_bitmask() as u32,
-            left: left.into(),
-            top: top.into(),
-            block_count: 0,
-            blocks: [Block::default(); BLOCKS],
-        };
-        if sight.small == 0 {
-            return sight;
+        self.small = small.to_bitmask() as u32;
+        self.others = others.to_bitmask() as u32;
+        self.swapped = swapped.to_bitmask() as u32;
+        self.maybe_many = 0;
+        self.block_count = 0;
+        if self.small == 0 {
+            return;
         }
+        (self.left, self.top) = (left.into(), top.into());
         let (bx, cx) = (swapped.select(cx, bx), swapped.select(bx, cx));
         let (by, cy) = (swapped.select(cy, by), swapped.select(by, cy));
         let (width, height) = (right - left + 1, bottom - top + 1);
@@ -104,8 +109,8 @@ impl Sight {
                     halves = within(simd, halves, width - across, height - down);
                 }
                 any = any | halves[0] | halves[1];
-                sight.blocks[sight.block_count] = Block { across, down, halves: halves.map(Into::into) };
-                sight.block_count += 1;
+                self.blocks[self.block_count] = Block { across, down, halves: halves.map(Into::into) };
+                self.block_count += 1;
                 for edge in &mut block {
                     edge.value += edge.right * BLOCK_PX;
                 }
@@ -115,11 +120,10 @@ impl Sight {
             }
         }
         small &= !any.simd_eq(0);
-        sight.small = small.to_bitmask() as u32;
-        if sight.block_count > 1 {
-            sight.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
+        self.small = small.to_bitmask() as u32;
+        if self.block_count > 1 {
+            self.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
         }
-        sight
     }
 
     /// A block's first sample in the bounds of a triangle, and which of its samples that covers, row by row.
@@ -138,7 +142,7 @@ impl Sight {
 
 /// Of the samples of a block those in the first so many columns and rows. Rarely asked for.
 #[inline(always)]
-fn within<S: Simd>(simd: S, halves: [i32x16<S>; 2], columns: i32x16<S>, rows: i32x16<S>) -> [i32x16<S>; 2] {
+fn within<S: Simd>(simd: S, halves: [i32x8<S>; 2], columns: i32x8<S>, rows: i32x8<S>) -> [i32x8<S>; 2] {
     #[cold]
     #[inline(never)]
     fn within(halves: &mut [[i32; LANES]; 2], columns: &[i32; LANES], rows: &[i32; LANES]) {
@@ -151,7 +155,7 @@ fn within<S: Simd>(simd: S, halves: [i32x16<S>; 2], columns: i32x16<S>, rows: i3
     }
     let mut halves = halves.map(Into::into);
     within(&mut halves, &columns.into(), &rows.into());
-    halves.map(|half| i32x16::load_array(simd, half))
+    halves.map(|half| i32x8::load_array(simd, half))
 }
 
 /// The first so many columns of a block.
@@ -168,15 +172,15 @@ fn rows_mask(count: i32) -> u64 {
 
 /// The samples of a block that lie inside three edges: rows 0 to 3 and 4 to 7, a bit for each.
 #[inline(always)]
-fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x16<S>; 2] {
+fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x8<S>; 2] {
     // Seen to be at most 8, loops would be unrolled, and multiples of steps that are hardly ever taken computed beforehand.
     let [columns, rows] = black_box(size);
     let [a, b, c] = edges;
-    let zero = i32x16::splat(simd, 0);
+    let zero = i32x8::splat(simd, 0);
     let mut row = [a.value, b.value, c.value];
     let mut halves = [zero; 2];
     for (half, rows) in halves.iter_mut().zip([rows.min(BLOCK_PX / 2), rows - BLOCK_PX / 2]) {
-        let mut bits = i32x16::splat(simd, 1);
+        let mut bits = i32x8::splat(simd, 1);
         for _ in 0..rows {
             let [mut a_here, mut b_here, mut c_here] = row;
             let mut bit = bits;
@@ -194,30 +198,30 @@ fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x1
 
 /// The first sample at or after a coordinate, from the window's first on.
 #[inline(always)]
-fn first_sample<S: Simd>(subpixels: i32x16<S>, first: i32) -> i32x16<S> {
+fn first_sample<S: Simd>(subpixels: i32x8<S>, first: i32) -> i32x8<S> {
     ((subpixels + (SUBPIXELS / 2 - 1)) >> 8).max(first)
 }
 
 /// The last sample at or before a coordinate.
 #[inline(always)]
-fn last_sample<S: Simd>(subpixels: i32x16<S>) -> i32x16<S> {
+fn last_sample<S: Simd>(subpixels: i32x8<S>) -> i32x8<S> {
     (subpixels - SUBPIXELS / 2) >> 8
 }
 
-/// An edge of sixteen triangles as [`pellucid_core::pixel_grid::Edge`] has it.
+/// An edge of eight triangles as [`pellucid_core::pixel_grid::Edge`] has it.
 #[derive(Clone, Copy)]
 struct Edge<S: Simd> {
     /// Change for one sample to the right.
-    right: i32x16<S>,
+    right: i32x8<S>,
     /// Change for one sample downwards.
-    down: i32x16<S>,
+    down: i32x8<S>,
     /// Value at a position, less 1 if the line itself is outside.
-    value: i32x16<S>,
+    value: i32x8<S>,
 }
 
 impl<S: Simd> Edge<S> {
     #[inline(always)]
-    fn new(from: [i32x16<S>; 2], to: [i32x16<S>; 2], at: [i32x16<S>; 2]) -> Self {
+    fn new(from: [i32x8<S>; 2], to: [i32x8<S>; 2], at: [i32x8<S>; 2]) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let value = dx * (at[1] - from[1]) - dy * (at[0] - from[0]);
         let owns_line = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));

@@ -18,7 +18,11 @@ use crate::bin::{TILE_PX, TileGrid};
 use crate::simd::{Lookup, light, narrow, widen, words};
 use crate::transform::DrawVertices;
 
-pub(crate) const LANES: usize = 16;
+/// Triangles that wait until fragments are made.
+const WAITING: usize = 16;
+
+/// Triangles side by side: one to a lane.
+pub(crate) const LANES: usize = 8;
 
 /// Side of a block of samples.
 pub(crate) const BLOCK_PX: i32 = 8;
@@ -66,14 +70,14 @@ pub(crate) struct SmallFragments {
 pub(crate) struct SmallTriangles {
     count: usize,
     /// Corners, clockwise on the screen.
-    corners: [[u32; 3]; LANES],
+    corners: [[u32; 3]; WAITING],
     /// Number of the triangle in the draw's mesh.
-    triangles: [u32; LANES],
+    triangles: [u32; WAITING],
     /// The first sample of the block ...
-    left: [i32; LANES],
-    top: [i32; LANES],
+    left: [i32; WAITING],
+    top: [i32; WAITING],
     /// ... and which ones of it are covered, row by row.
-    covered: [u64; LANES],
+    covered: [u64; WAITING],
     /// What eight of them cover.
     samples: Samples,
 }
@@ -89,7 +93,7 @@ impl SmallTriangles {
         self.top[lane] = top;
         self.covered[lane] = covered;
         self.count += 1;
-        self.count == LANES
+        self.count == WAITING
     }
 
     /// Turns the triangles into fragments. A function of its own: inlined into the loop over triangles, its conditions on
@@ -118,21 +122,18 @@ impl SmallTriangles {
         fragments: &mut NewFragments,
     ) {
         let count = std::mem::take(&mut self.count);
-        for first in (0..count).step_by(EIGHT) {
+        for first in (0..count).step_by(LANES) {
             let triangles = Triangles::new(simd, self, first, draw, vertices);
-            self.samples.put_down(&self.covered[first..count.min(first + EIGHT)]);
-            let (new_places, new_fragments) = fragments.add(self.samples.count, EIGHT);
-            let samples = self.samples.numbers[..self.samples.count.next_multiple_of(EIGHT)].as_chunks().0;
-            let room = new_places.chunks_exact_mut(EIGHT).zip(new_fragments.chunks_exact_mut(EIGHT));
+            self.samples.put_down(&self.covered[first..count.min(first + LANES)]);
+            let (new_places, new_fragments) = fragments.add(self.samples.count, LANES);
+            let samples = self.samples.numbers[..self.samples.count.next_multiple_of(LANES)].as_chunks().0;
+            let room = new_places.chunks_exact_mut(LANES).zip(new_fragments.chunks_exact_mut(LANES));
             for (samples, (places, fragments)) in samples.iter().zip(room) {
                 triangles.make_fragments(simd, samples, draw_number, grid, places, fragments);
             }
         }
     }
 }
-
-/// Triangles, or blocks of them, whose fragments are made together: one to a lane.
-const EIGHT: usize = 8;
 
 /// What fragments of eight triangles are made of.
 struct Triangles<S: Simd> {
@@ -163,8 +164,8 @@ impl<S: Simd> Triangles<S> {
     /// Those from number `first` on; where there are fewer than eight, others that were there before.
     #[inline(always)]
     fn new(simd: S, all: &SmallTriangles, first: usize, draw: &Draw<'_>, vertices: DrawVertices<'_>) -> Self {
-        let corners: &[[u32; 3]; EIGHT] = eight(&all.corners, first);
-        let numbers: &[u32; EIGHT] = eight(&all.triangles, first);
+        let corners: &[[u32; 3]; LANES] = eight(&all.corners, first);
+        let numbers: &[u32; LANES] = eight(&all.triangles, first);
         // All of one length, so that a corner is known to be in each if it is in one.
         let count = draw.mesh.positions().len();
         let (positions, depths) = (&vertices.positions[..count], &vertices.depths[..count]);
@@ -223,7 +224,7 @@ impl<S: Simd> Triangles<S> {
     fn make_fragments(
         &self,
         simd: S,
-        samples: &[u16; EIGHT],
+        samples: &[u16; LANES],
         draw_number: u32,
         grid: &TileGrid,
         places: &mut [u32],
@@ -257,7 +258,7 @@ impl<S: Simd> Triangles<S> {
         };
         let (depth, light) = (depth.bitcast::<u32x8<S>>().split(), light.bitcast::<u32x8<S>>().split());
         let (primitive, draw) = (lookup.words(self.primitive).split(), u32x4::splat(simd, draw_number));
-        let (first, second) = bytemuck::cast_slice_mut(fragments).split_at_mut(EIGHT / 2 * 4);
+        let (first, second) = bytemuck::cast_slice_mut(fragments).split_at_mut(LANES / 2 * 4);
         u32x4::store_four_interleaved([depth.0, light.0, primitive.0, draw], first);
         u32x4::store_four_interleaved([depth.1, light.1, primitive.1, draw], second);
     }
@@ -265,8 +266,8 @@ impl<S: Simd> Triangles<S> {
 
 /// Eight in a row.
 #[inline(always)]
-fn eight<T>(all: &[T; LANES], first: usize) -> &[T; EIGHT] {
-    &all.as_chunks().0[first / EIGHT]
+fn eight<T>(all: &[T; WAITING], first: usize) -> &[T; LANES] {
+    &all.as_chunks().0[first / LANES]
 }
 
 /// Bits of a sample's number in its block.
@@ -276,13 +277,13 @@ const BLOCK_BITS: u32 = 6;
 #[derive(Debug)]
 struct Samples {
     /// Number in the block, above it the triangle's lane; beyond `count` anything.
-    numbers: [u16; EIGHT << BLOCK_BITS],
+    numbers: [u16; LANES << BLOCK_BITS],
     count: usize,
 }
 
 impl Default for Samples {
     fn default() -> Self {
-        Self { numbers: [0; EIGHT << BLOCK_BITS], count: 0 }
+        Self { numbers: [0; LANES << BLOCK_BITS], count: 0 }
     }
 }
 
@@ -395,7 +396,7 @@ fn unit(edge: Vec3) -> Vec3 {
 /// What there is for each lane. Written out, so that it goes to registers: vectors that are loaded from where their lanes
 /// have just been stored wait for it.
 #[inline(always)]
-fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; EIGHT] {
+fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; LANES] {
     [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
 }
 
@@ -412,13 +413,15 @@ fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x8<S>; 3] {
 
 /// Pairs of numbers at one corner of each triangle.
 #[inline(always)]
-fn gather_pairs<S: Simd, V: SimdBase<S>>(
+pub(crate) fn gather_pairs<S: Simd, V: SimdBase<S>>(
     simd: S,
-    corners: &[[u32; 3]; EIGHT],
+    corners: &[[u32; 3]; LANES],
     k: usize,
     from: &[[V::Element; 2]],
 ) -> [V; 2] {
-    load_pairs(simd, &each_lane(|lane| from[corners[lane][k] as usize]))
+    let pairs = each_lane(|lane| from[corners[lane][k] as usize]);
+    let (low, high) = pairs.as_flattened().split_at(LANES);
+    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high)).into()
 }
 
 /// Normals in camera space.
@@ -430,13 +433,6 @@ fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x8<S>; 3]) -> [f32x8<S>; 3] 
         (x * matrix.x_axis.y + y * matrix.y_axis.y) + z * matrix.z_axis.y,
         (x * matrix.x_axis.z + y * matrix.y_axis.z) + z * matrix.z_axis.z,
     ]
-}
-
-/// Two vectors from one of pairs.
-#[inline(always)]
-pub(crate) fn load_pairs<S: Simd, V: SimdBase<S>, const N: usize>(simd: S, pairs: &[[V::Element; 2]; N]) -> [V; 2] {
-    let (low, high) = pairs.as_flattened().split_at(N);
-    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high)).into()
 }
 
 impl NewFragments {
