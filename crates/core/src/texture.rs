@@ -283,12 +283,17 @@ impl AlphaQuads {
         Some(Self { firsts, quads })
     }
 
-    /// A level's quad of this number. They lie row by row: from the one before the first texel to the one behind the last, or of
+    /// Where a level's quads begin. They lie row by row: from the one before the first texel to the one behind the last, or of
     /// mirrored textures to the one behind the last of the mirror image.
     #[inline(always)]
-    pub fn quad(&self, level: i32, number: i32) -> [u8; 4] {
-        let first = self.firsts[level as usize % MAX_LEVELS.next_power_of_two()];
-        self.quads[first as usize + number as usize]
+    pub fn first(&self, level: usize) -> u32 {
+        self.firsts[level % MAX_LEVELS.next_power_of_two()]
+    }
+
+    /// The quad at a place; where there is none, one of alphas 0.
+    #[inline(always)]
+    pub fn quad(&self, place: u32) -> [u8; 4] {
+        self.quads.get(place as usize).copied().unwrap_or_default()
     }
 }
 

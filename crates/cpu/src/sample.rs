@@ -49,9 +49,9 @@ impl<S: Simd> OnTexture<S> {
     #[inline(always)]
     pub(crate) fn alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, count: usize) -> Option<f32x8<S>> {
         let Levels { near, far } = self.levels(simd, texture, count)?;
-        let near = self.level_alphas(simd, texture, quads, near, count);
+        let near = self.level_alphas(simd, texture, quads, near);
         let Some((far, fraction)) = far else { return Some(near) };
-        Some(near + (self.level_alphas(simd, texture, quads, far, count) - near) * fraction)
+        Some(near + (self.level_alphas(simd, texture, quads, far) - near) * fraction)
     }
 
     /// Which levels the first `count` see; `None` where filters are mixed, or coordinates have no value.
@@ -81,21 +81,18 @@ impl<S: Simd> OnTexture<S> {
         Some(Levels { near, far: Some(((near + 1).min(last as i32), fraction)) })
     }
 
-    /// The alphas of the first `count` on a level each.
+    /// The alphas on a level each.
     #[inline(always)]
-    fn level_alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, level: i32x8<S>, count: usize) -> f32x8<S> {
+    fn level_alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, level: i32x8<S>) -> f32x8<S> {
         let sampler = texture.sampler();
         let [width, height] = level_size(simd, texture, level);
         let (left, across) = texel_before(self.u, width, sampler.wrap_u);
         let (top, down) = texel_before(self.v, height, sampler.wrap_v);
         let columns = if sampler.wrap_u == Wrap::MirroredRepeat { width * 2 } else { width };
-        let numbers: [i32; LANES] = ((top + 1) * (columns + 1) + (left + 1)).into();
-        let level: [i32; LANES] = level.into();
-        let mut found = [0; LANES];
-        for lane in 0..count {
-            found[lane] = u32::from_le_bytes(quads.quad(level[lane], numbers[lane]));
-        }
-        let found = u32x8::load_array(simd, found).bitcast();
+        let first = of_level(simd, level, |level| quads.first(level));
+        let places: [i32; LANES] = (first + (top + 1) * (columns + 1) + (left + 1)).into();
+        // Places of lanes beyond `count` may be anywhere.
+        let found = u32x8::from_fn(simd, |lane| u32::from_le_bytes(quads.quad(places[lane] as u32))).bitcast();
         let (top_left, top_right) = (alpha(found), alpha(found >> 8));
         let (bottom_left, bottom_right) = (alpha(found >> 16), alpha(found >> 24));
         let above = top_left + (top_right - top_left) * across;
@@ -153,11 +150,7 @@ impl<'a> Footprints<'a> {
         let [width, height] = level_size(simd, texture, level);
         let (left, right, across) = texel_pair(simd, at.u, width, sampler.wrap_u);
         let (top, bottom, down) = texel_pair(simd, at.v, height, sampler.wrap_v);
-        let mut firsts: [i32; LANES] = level.into();
-        for first in &mut firsts {
-            *first = texture.levels()[*first as usize].first_texel as i32;
-        }
-        let first = i32x8::load_array(simd, firsts);
+        let first = of_level(simd, level, |level| texture.levels()[level].first_texel);
         let (top, bottom) = (top * width + first, bottom * width + first);
         Self {
             texels: texture.texels(),
@@ -243,6 +236,16 @@ fn level_size<S: Simd>(simd: S, texture: &Texture, level: i32x8<S>) -> [i32x8<S>
     let width = i32x8::splat(simd, full_size.width as i32) >> level;
     let height = i32x8::splat(simd, full_size.height as i32) >> level;
     [width.max(1), height.max(1)]
+}
+
+/// What there is for each lane's level. Neighbours are mostly on one.
+#[inline(always)]
+fn of_level<S: Simd>(simd: S, level: i32x8<S>, of: impl Fn(usize) -> u32) -> i32x8<S> {
+    let levels: [i32; LANES] = level.into();
+    if level.simd_eq(levels[0]).all_true() {
+        return i32x8::splat(simd, of(levels[0] as usize) as i32);
+    }
+    i32x8::load_array(simd, levels.map(|level| of(level as usize) as i32))
 }
 
 /// The alpha in the lowest byte, as [`TexelValues`] has it.

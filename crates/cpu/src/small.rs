@@ -456,6 +456,23 @@ impl NewFragments {
     }
 }
 
+#[inline(always)]
+fn tile_of(place: u32) -> usize {
+    (place >> SAMPLE_BITS) as usize
+}
+
+#[inline(always)]
+fn sample_of(place: u32) -> u16 {
+    (place & ((1 << SAMPLE_BITS) - 1)) as u16
+}
+
+/// The tile that all places are in, if they are in one, as those of neighbours mostly are.
+#[inline(always)]
+fn common_tile(places: &[u32; LANES]) -> Option<usize> {
+    let differing = places.iter().fold(0, |bits, place| bits | (place ^ places[0]));
+    (tile_of(differing) == 0).then_some(tile_of(places[0]))
+}
+
 impl SmallFragments {
     /// Takes over what came, sorted by tile, keeping draw order.
     pub(crate) fn take(&mut self, new: &mut NewFragments, grid: &TileGrid) {
@@ -464,19 +481,16 @@ impl SmallFragments {
         if count == 0 {
             return;
         }
-        let (places, fragments) = (&new.places[..count], &new.fragments[..count]);
+        let (places, other_places) = new.places[..count].as_chunks::<LANES>();
+        let (fragments, other_fragments) = new.fragments[..count].as_chunks::<LANES>();
         self.starts.resize(grid.tile_count() + 1, 0);
-        let (mut last_tile, mut last_count) = (0, 0);
-        for place in places {
-            // Mostly the tile of the one before: its count waits in a register.
-            let tile = (place >> SAMPLE_BITS) as usize;
-            if tile != last_tile {
-                self.starts[last_tile + 1] += std::mem::take(&mut last_count);
-                last_tile = tile;
+        for places in places {
+            match common_tile(places) {
+                Some(tile) => self.starts[tile + 1] += LANES as u32,
+                None => places.iter().for_each(|&place| self.starts[tile_of(place) + 1] += 1),
             }
-            last_count += 1;
         }
-        self.starts[last_tile + 1] += last_count;
+        other_places.iter().for_each(|&place| self.starts[tile_of(place) + 1] += 1);
         for i in 1..self.starts.len() {
             self.starts[i] += self.starts[i - 1];
         }
@@ -486,22 +500,32 @@ impl SmallFragments {
             self.fragments.resize(count + count / 16, SmallFragment::default());
         }
         // Each start moves to the next one's place while its fragments are put down ...
-        let (mut last_tile, mut start) = (0, 0);
-        let (sorted_samples, sorted_fragments) = (&mut self.samples[..count], &mut self.fragments[..count]);
-        for (&place, fragment) in places.iter().zip(fragments) {
-            let tile = (place >> SAMPLE_BITS) as usize;
-            if tile != last_tile {
-                self.starts[last_tile] = start as u32;
-                (last_tile, start) = (tile, self.starts[tile] as usize);
+        for (places, fragments) in places.iter().zip(fragments) {
+            match common_tile(places) {
+                Some(tile) => self.put_down(tile, places, fragments),
+                None => self.put_down_each(places, fragments),
             }
-            sorted_samples[start] = (place & ((1 << SAMPLE_BITS) - 1)) as u16;
-            sorted_fragments[start] = *fragment;
-            start += 1;
         }
-        self.starts[last_tile] = start as u32;
+        self.put_down_each(other_places, other_fragments);
         // ... and back.
         self.starts.copy_within(0..grid.tile_count(), 1);
         self.starts[0] = 0;
+    }
+
+    /// Puts down fragments that lie in one tile.
+    #[inline(always)]
+    fn put_down<const N: usize>(&mut self, tile: usize, places: &[u32; N], fragments: &[SmallFragment; N]) {
+        let start = self.starts[tile] as usize;
+        self.starts[tile] += N as u32;
+        self.samples[start..start + N].copy_from_slice(&places.map(sample_of));
+        self.fragments[start..start + N].copy_from_slice(fragments);
+    }
+
+    #[inline(always)]
+    fn put_down_each(&mut self, places: &[u32], fragments: &[SmallFragment]) {
+        for (&place, &fragment) in places.iter().zip(fragments) {
+            self.put_down(tile_of(place), &[place], &[fragment]);
+        }
     }
 
     /// The fragments in a tile, in draw order, and their samples.
