@@ -171,6 +171,7 @@ impl Chunk {
         let all = &draw.mesh.triangles()[span.first..span.first + span.count];
         let mut small = SmallTriangles::default();
         let mut sight = Sight::default();
+        let normals = draw.mesh.normals().filter(|_| draw.lit).unwrap_or_default();
         for start in (0..all.len()).step_by(LANES) {
             // The other corners are mostly those of neighbours.
             for &[vertex, ..] in all.iter().skip(start + FETCHED_AHEAD).take(LANES) {
@@ -203,13 +204,15 @@ impl Chunk {
                     }
                     let [a, b, c] = triangles[lane];
                     let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
-                    small::fetch(corners, draw, vertices);
-                    for number in 0..sight.block_count {
+                    small::fetch(corners, vertices.depths, normals);
+                    let mut push = |number| {
                         let (block, covered) = sight.block(number, lane);
                         if covered != 0 && small.push(first + lane, corners, block, covered) {
                             small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
                         }
-                    }
+                    };
+                    push(0);
+                    (1..sight.block_count).for_each(push);
                 }
             }
             while records != 0 {

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use fearless_simd::{Select, Simd, SimdBase, SimdMask, i32x8};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdMask, i32x8, u64x8};
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
@@ -42,8 +42,8 @@ struct Block {
     /// From the first sample of the bounds.
     across: i32,
     down: i32,
-    /// Which samples of the upper and the lower half each triangle covers, a bit for each.
-    halves: [[i32; LANES]; 2],
+    /// Which samples each triangle covers, row by row.
+    covered: [u64; LANES],
 }
 
 impl Sight {
@@ -102,14 +102,12 @@ impl Sight {
         for down in (0..rows).step_by(BLOCK_PX as usize) {
             let mut block = row;
             for across in (0..columns).step_by(BLOCK_PX as usize) {
-                let mut halves =
-                    cover_block(simd, &block, [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)]);
-                if leaves_window {
-                    // Beyond the bounds there are no samples, but beyond the window there may be.
-                    halves = within(simd, halves, width - across, height - down);
-                }
-                any = any | halves[0] | halves[1];
-                self.blocks[self.block_count] = Block { across, down, halves: halves.map(Into::into) };
+                let size = [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)];
+                let (upper, lower) = cover_block(simd, &block, size);
+                any = any | upper | lower;
+                let (low, high) = upper.interleave(lower);
+                let covered = low.combine(high).bitcast::<u64x8<S>>().into();
+                self.blocks[self.block_count % BLOCKS] = Block { across, down, covered };
                 self.block_count += 1;
                 for edge in &mut block {
                     edge.value += edge.right * BLOCK_PX;
@@ -121,41 +119,40 @@ impl Sight {
         }
         small &= !any.simd_eq(0);
         self.small = small.to_bitmask() as u32;
+        if leaves_window {
+            self.leave_out_beyond(&width.into(), &height.into());
+        }
         if self.block_count > 1 {
             self.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
         }
     }
 
+    /// Leaves out samples beyond so many columns and rows from a triangle's first: there are none beyond its bounds, but there
+    /// may be some beyond the window.
+    #[cold]
+    #[inline(never)]
+    fn leave_out_beyond(&mut self, columns: &[i32; LANES], rows: &[i32; LANES]) {
+        let mut small = 0;
+        for Block { across, down, covered } in &mut self.blocks[..self.block_count] {
+            for (lane, covered) in covered.iter_mut().enumerate() {
+                *covered &= columns_mask(columns[lane] - *across) & rows_mask(rows[lane] - *down);
+                small |= u32::from(*covered != 0) << lane;
+            }
+        }
+        self.small &= small;
+    }
+
     /// A block's first sample in the bounds of a triangle, and which of its samples that covers, row by row.
     #[inline(always)]
     pub(crate) fn block(&self, number: usize, lane: usize) -> ([i32; 2], u64) {
-        let Block { across, down, halves: [low, high] } = &self.blocks[number % BLOCKS];
-        let covered = u64::from(low[lane] as u32) | u64::from(high[lane] as u32) << 32;
-        ([self.left[lane] + across, self.top[lane] + down], covered)
+        let Block { across, down, covered } = &self.blocks[number % BLOCKS];
+        ([self.left[lane] + across, self.top[lane] + down], covered[lane])
     }
 
     /// How many samples a small triangle covers.
     pub(crate) fn covered_count(&self, lane: usize) -> u32 {
         (0..self.block_count).map(|number| self.block(number, lane).1.count_ones()).sum()
     }
-}
-
-/// Of the samples of a block those in the first so many columns and rows. Rarely asked for.
-#[inline(always)]
-fn within<S: Simd>(simd: S, halves: [i32x8<S>; 2], columns: i32x8<S>, rows: i32x8<S>) -> [i32x8<S>; 2] {
-    #[cold]
-    #[inline(never)]
-    fn within(halves: &mut [[i32; LANES]; 2], columns: &[i32; LANES], rows: &[i32; LANES]) {
-        let [low, high] = halves;
-        for lane in 0..LANES {
-            let mask = columns_mask(columns[lane]) & rows_mask(rows[lane]);
-            low[lane] &= mask as i32;
-            high[lane] &= (mask >> 32) as i32;
-        }
-    }
-    let mut halves = halves.map(Into::into);
-    within(&mut halves, &columns.into(), &rows.into());
-    halves.map(|half| i32x8::load_array(simd, half))
 }
 
 /// The first so many columns of a block.
@@ -172,7 +169,7 @@ fn rows_mask(count: i32) -> u64 {
 
 /// The samples of a block that lie inside three edges: rows 0 to 3 and 4 to 7, a bit for each.
 #[inline(always)]
-fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x8<S>; 2] {
+fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> (i32x8<S>, i32x8<S>) {
     // Seen to be at most 8, loops would be unrolled, and multiples of steps that are hardly ever taken computed beforehand.
     let [columns, rows] = black_box(size);
     let [a, b, c] = edges;
@@ -193,7 +190,8 @@ fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> [i32x8
             row = [row[0] + a.down, row[1] + b.down, row[2] + c.down];
         }
     }
-    halves
+    let [upper, lower] = halves;
+    (upper, lower)
 }
 
 /// The first sample at or after a coordinate, from the window's first on.

@@ -315,13 +315,11 @@ impl Samples {
 
 /// Fetches into the cache what making fragments of a triangle takes beside the positions of its corners.
 #[inline(always)]
-pub(crate) fn fetch(corners: [u32; 3], draw: &Draw<'_>, vertices: DrawVertices<'_>) {
+pub(crate) fn fetch(corners: [u32; 3], depths: &[[f32; 2]], normals: &[Vec3]) {
     for corner in corners {
-        prefetch_index(vertices.depths, corner as usize);
+        prefetch_index(depths, corner as usize);
     }
-    if draw.lit
-        && let Some(normals) = draw.mesh.normals()
-    {
+    if !normals.is_empty() {
         for corner in corners {
             prefetch_index(normals, corner as usize);
         }
