@@ -62,6 +62,12 @@ pub(crate) fn run(plan: &BenchPlan) -> anyhow::Result<()> {
         let (planned, name) = (plural(session.planned() as u64, "point"), plan.output.display());
         say(&format!("Going on: {done} of {planned} are measured already, as {name} tells (--fresh starts over)."));
     }
+    if session.hardware.gpu_is_software && malloc_gives_back() {
+        say(
+            "The C library gives a software GPU's memory back between frames, which costs it time: before this command,",
+        );
+        say("MALLOC_TRIM_THRESHOLD_=2000000000 MALLOC_MMAP_THRESHOLD_=1000000000 lets it keep the memory.");
+    }
     if !session.is_complete() {
         let mut pace = try_out(plan, &mut machine)?;
         let effort = Effort { repeats: plan.repeats, time_limit: plan.time_limit };
@@ -82,6 +88,11 @@ pub(crate) fn run(plan: &BenchPlan) -> anyhow::Result<()> {
             bail!("{} could not be measured, see above; the same command tries again", plural(count as u64, "point"))
         }
     }
+}
+
+/// Whether the C library has its own way with memory that was freed: glibc's, unless it is told otherwise.
+fn malloc_gives_back() -> bool {
+    cfg!(all(target_os = "linux", target_env = "gnu")) && std::env::var_os("MALLOC_TRIM_THRESHOLD_").is_none()
 }
 
 /// What is to be measured, with no results yet.
