@@ -290,6 +290,11 @@ impl AlphaQuads {
         self.firsts[level % MAX_LEVELS.next_power_of_two()]
     }
 
+    /// Whether there is a quad at a place.
+    pub fn has(&self, place: u32) -> bool {
+        (place as usize) < self.quads.len()
+    }
+
     /// The quad at a place; where there is none, one of alphas 0.
     #[inline(always)]
     pub fn quad(&self, place: u32) -> [u8; 4] {

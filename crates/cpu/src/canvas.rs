@@ -13,8 +13,8 @@ use crate::tile::TILE_SAMPLES;
 /// Pixels that a thread fills at a time.
 const FILLED_PIXELS: usize = 1 << 15;
 
-/// A picture to be rendered into again, as a turntable or a window does. What is written of it is only what differs from the
-/// background, now or in the picture before.
+/// A picture to be rendered into again, as a turntable or a window does. As long as size and background stay the same, what is
+/// written of it is only what differs from the background, now or in the picture before.
 #[derive(Debug, Clone)]
 pub struct Canvas {
     image: Image,
@@ -85,6 +85,7 @@ impl Canvas {
         if [self.image.width(), self.image.height()] == [view.width, view.height] {
             self.image.pixels_mut().par_chunks_mut(FILLED_PIXELS).for_each(|pixels| pixels.fill(view.background));
         } else {
+            self.image = Image::filled(0, 0, Vec4::ZERO);
             let pixels = rayon::iter::repeat_n(view.background, count).with_min_len(FILLED_PIXELS);
             self.image = Image::from_pixels(view.width, view.height, pixels.collect());
         }

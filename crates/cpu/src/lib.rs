@@ -2,7 +2,7 @@
 //!
 //! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` looks what
 //! is in `sight`, turns `small` triangles into fragments and others into records, and hands both to tiles through `bin`;
-//! `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a time.
+//! `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a time, into a `canvas`.
 #![forbid(unsafe_code)]
 
 mod bin;

@@ -86,8 +86,8 @@ struct Run<'a> {
     start: Instant,
 }
 
-/// The steps of a frame. Those of tiles run side by side: what they took together is shared out. The background is filled
-/// during the first two.
+/// The steps of a frame. Those of tiles run side by side: what they took together is shared out. A picture that is not
+/// filled with the background yet is filled during the first two.
 const STEPS: [&str; 5] = ["transform", "clip, setup and bin", "raster", "order", "shade and resolve"];
 
 impl CpuRenderer {

@@ -49,9 +49,9 @@ impl<S: Simd> OnTexture<S> {
     #[inline(always)]
     pub(crate) fn alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, count: usize) -> Option<f32x8<S>> {
         let Levels { near, far } = self.levels(simd, texture, count)?;
-        let near = self.level_alphas(simd, texture, quads, near);
+        let near = self.level_alphas(simd, texture, quads, near, count);
         let Some((far, fraction)) = far else { return Some(near) };
-        Some(near + (self.level_alphas(simd, texture, quads, far) - near) * fraction)
+        Some(near + (self.level_alphas(simd, texture, quads, far, count) - near) * fraction)
     }
 
     /// Which levels the first `count` see; `None` where filters are mixed, or coordinates have no value.
@@ -81,9 +81,9 @@ impl<S: Simd> OnTexture<S> {
         Some(Levels { near, far: Some(((near + 1).min(last as i32), fraction)) })
     }
 
-    /// The alphas on a level each.
+    /// The alphas on a level each; those beyond the first `count` may be anything.
     #[inline(always)]
-    fn level_alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, level: i32x8<S>) -> f32x8<S> {
+    fn level_alphas(&self, simd: S, texture: &Texture, quads: &AlphaQuads, level: i32x8<S>, count: usize) -> f32x8<S> {
         let sampler = texture.sampler();
         let [width, height] = level_size(simd, texture, level);
         let (left, across) = texel_before(self.u, width, sampler.wrap_u);
@@ -91,7 +91,7 @@ impl<S: Simd> OnTexture<S> {
         let columns = if sampler.wrap_u == Wrap::MirroredRepeat { width * 2 } else { width };
         let first = of_level(simd, level, |level| quads.first(level));
         let places: [i32; LANES] = (first + (top + 1) * (columns + 1) + (left + 1)).into();
-        // Places of lanes beyond `count` may be anywhere.
+        debug_assert!(places[..count].iter().all(|&place| quads.has(place as u32)));
         let found = u32x8::from_fn(simd, |lane| u32::from_le_bytes(quads.quad(places[lane] as u32))).bitcast();
         let (top_left, top_right) = (alpha(found), alpha(found >> 8));
         let (bottom_left, bottom_right) = (alpha(found >> 16), alpha(found >> 24));

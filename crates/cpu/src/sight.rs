@@ -105,7 +105,8 @@ impl Sight {
                 let size = [(columns - across).min(BLOCK_PX), (rows - down).min(BLOCK_PX)];
                 let (upper, lower) = cover_block(simd, &block, size);
                 any = any | upper | lower;
-                let (low, high) = upper.interleave(lower);
+                let [first, second] = if cfg!(target_endian = "little") { [upper, lower] } else { [lower, upper] };
+                let (low, high) = first.interleave(second);
                 let covered = low.combine(high).bitcast::<u64x8<S>>().into();
                 self.blocks[self.block_count % BLOCKS] = Block { across, down, covered };
                 self.block_count += 1;

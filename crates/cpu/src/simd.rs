@@ -65,7 +65,6 @@ pub(crate) fn words<S: Simd>(values: f64x8<S>) -> [u32x8<S>; 2] {
 }
 
 /// Which one of eight numbers each lane gets.
-#[derive(Clone, Copy)]
 pub(crate) struct Lookup<S: Simd> {
     simd: S,
     numbers: u32x8<S>,

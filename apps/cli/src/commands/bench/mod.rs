@@ -62,7 +62,7 @@ pub(crate) fn run(plan: &BenchPlan) -> anyhow::Result<()> {
         let (planned, name) = (plural(session.planned() as u64, "point"), plan.output.display());
         say(&format!("Going on: {done} of {planned} are measured already, as {name} tells (--fresh starts over)."));
     }
-    if session.hardware.gpu_is_software && malloc_gives_back() {
+    if !session.is_complete() && session.hardware.gpu_is_software && malloc_gives_back() {
         say(
             "The C library gives a software GPU's memory back between frames, which costs it time: before this command,",
         );
@@ -92,7 +92,9 @@ pub(crate) fn run(plan: &BenchPlan) -> anyhow::Result<()> {
 
 /// Whether the C library has its own way with memory that was freed: glibc's, unless it is told otherwise.
 fn malloc_gives_back() -> bool {
-    cfg!(all(target_os = "linux", target_env = "gnu")) && std::env::var_os("MALLOC_TRIM_THRESHOLD_").is_none()
+    let is_told = |name| std::env::var_os(name).is_some();
+    cfg!(all(target_os = "linux", target_env = "gnu"))
+        && !(is_told("MALLOC_TRIM_THRESHOLD_") && is_told("MALLOC_MMAP_THRESHOLD_") || is_told("GLIBC_TUNABLES"))
 }
 
 /// What is to be measured, with no results yet.
