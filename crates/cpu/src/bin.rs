@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pellucid_core::pixel_grid::{SUBPIXELS, ScreenTriangle, ScreenVertex, Viewport, center};
 
-use crate::small::add_counts;
+use crate::small_fragments::add_counts;
 
 /// Side of a tile in pixels. Small enough that the fragments of a tile with hundreds of layers stay in the second-level
 /// cache, large enough that small triangles rarely lie in two.

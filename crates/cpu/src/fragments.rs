@@ -3,7 +3,7 @@
 use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8, mask32x8, u32x8};
 
 use crate::shade::SHADED_LANES;
-use crate::small::SmallFragment;
+use crate::small_fragments::SmallFragment;
 use crate::tile::Band;
 
 /// Where the colour of a fragment comes from: 0 for none, the number of a draw plus 1, in whose palette colour it is lit,

@@ -1,8 +1,9 @@
 //! The CPU renderer of Pellucid: exact transparency, tile by tile, on all cores, no GPU needed.
 //!
 //! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` looks what
-//! is in `sight`, turns `small` triangles into fragments and others into records, and hands both to tiles through `bin`;
-//! `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a time, into a `canvas`.
+//! is in `sight`, turns `small` triangles into `small_fragments` and others into records, and hands both to tiles, records
+//! through `bin`; `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a
+//! time, into a `canvas`.
 #![forbid(unsafe_code)]
 
 mod bin;
@@ -20,6 +21,7 @@ mod shade;
 mod sight;
 pub mod simd;
 mod small;
+mod small_fragments;
 mod surfaces;
 mod tile;
 mod transform;

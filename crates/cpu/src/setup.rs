@@ -9,7 +9,8 @@ use prefetch_index::prefetch_index;
 
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
-use crate::small::{self, LANES, MOST_FRAGMENTS, NewFragments, SmallFragments, SmallTriangles};
+use crate::small::{self, LANES, MOST_FRAGMENTS, SmallTriangles};
+use crate::small_fragments::{NewFragments, SmallFragments};
 use crate::transform::{DrawVertices, outcode};
 
 /// A triangle in sight, or a piece of a clipped one.

@@ -15,7 +15,7 @@ use crate::order::Order;
 use crate::raster::{Coverage, Depths, FoldState, RowFragments, cover};
 use crate::setup::{Chunk, Record};
 use crate::shade::{Unshaded, VaryingSurface};
-use crate::small::SmallFragment;
+use crate::small_fragments::SmallFragment;
 use crate::surfaces::Surfaces;
 
 /// Samples of a tile.
