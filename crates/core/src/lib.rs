@@ -19,6 +19,7 @@ pub mod fragment;
 pub mod heat_map;
 pub mod image;
 pub mod layers;
+pub mod meshlets;
 pub mod oracle;
 pub mod pixel_grid;
 pub mod primitive;

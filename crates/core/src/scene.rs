@@ -4,10 +4,12 @@
 //! Vertex positions may still be NaN or infinite, as files hold such things; primitives that touch them are dropped and
 //! counted by the renderers.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
+use crate::meshlets::Meshlets;
 use crate::shading::GREATEST_COLOR;
 use crate::{Camera, Error, Texture};
 
@@ -52,6 +54,7 @@ pub struct Mesh {
     normals: Option<Vec<Vec3>>,
     tex_coords: Option<Vec<Vec2>>,
     colors: Option<Vec<Vec4>>,
+    meshlets: OnceLock<Meshlets>,
 }
 
 impl Mesh {
@@ -79,7 +82,7 @@ impl Mesh {
     /// [`Error::Mesh`] if there is not exactly one for each vertex.
     pub fn with_normals(mut self, normals: Vec<Vec3>) -> Result<Self, Error> {
         self.check_count("normals", normals.len())?;
-        self.normals = Some(normals);
+        self.set_normals(normals);
         Ok(self)
     }
 
@@ -123,8 +126,13 @@ impl Mesh {
         for normal in &mut normals {
             *normal = normal.normalize_or(Vec3::Z);
         }
-        self.normals = Some(normals);
+        self.set_normals(normals);
         self
+    }
+
+    fn set_normals(&mut self, normals: Vec<Vec3>) {
+        self.normals = Some(normals);
+        self.meshlets.take();
     }
 
     fn check_count(&self, what: &str, count: usize) -> Result<(), Error> {
@@ -157,6 +165,11 @@ impl Mesh {
     /// One colour a vertex: linear light, straight alpha.
     pub fn colors(&self) -> Option<&[Vec4]> {
         self.colors.as_deref()
+    }
+
+    /// The mesh cut into meshlets, which is done when they are first asked for; they are kept.
+    pub fn meshlets(&self) -> &Meshlets {
+        self.meshlets.get_or_init(|| Meshlets::new(self))
     }
 }
 

@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use pellucid_core::pixel_grid::{SUBPIXELS, ScreenTriangle, ScreenVertex, Viewport, center};
 
-use crate::small_fragments::add_counts;
-
 /// Side of a tile in pixels. Small enough that the fragments of a tile with hundreds of layers stay in the second-level
 /// cache, large enough that small triangles rarely lie in two.
 pub(crate) const TILE_PX: u32 = 32;
@@ -51,6 +49,13 @@ impl TileGrid {
 
     pub(crate) fn tile_count(&self) -> usize {
         self.columns as usize * self.rows as usize
+    }
+
+    /// The tile that a pixel of the window is in.
+    #[inline(always)]
+    pub(crate) fn tile_at(&self, x: i32, y: i32) -> u32 {
+        let (column, row) = ((x - self.window.left) as u32 / TILE_PX, (y - self.window.top) as u32 / TILE_PX);
+        row * self.columns + column
     }
 
     /// The pixels of a tile.
@@ -190,5 +195,12 @@ impl Bins {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         self.pairs.capacity() * size_of::<(u32, u32)>() + (self.starts.capacity() + self.records.capacity()) * 4
+    }
+}
+
+/// Adds the lengths of the ranges between `starts`, each place counting as so many.
+pub(crate) fn add_counts(starts: &[u32], weight: usize, counts: &mut [u64]) {
+    for (count, range) in counts.iter_mut().zip(starts.windows(2)) {
+        *count += u64::from(range[1] - range[0]) * weight as u64;
     }
 }

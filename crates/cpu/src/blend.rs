@@ -6,7 +6,7 @@ use pellucid_core::composite::Composite;
 
 use crate::fragments::COLOR;
 use crate::order::{STRIP, Strip};
-use crate::sample::channels;
+use crate::simd::columns;
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
 /// Layers blended between two looks at whether anything behind them still counts.
@@ -89,7 +89,7 @@ impl TileCapture {
                     colors[(source & !COLOR) as usize]
                 };
             }
-            blended.under(channels(simd, layer.as_flattened()));
+            blended.under(columns(simd, &layer));
             if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
                 break;
             }

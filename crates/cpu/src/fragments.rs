@@ -50,8 +50,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) sources: &'a mut [u32],
     /// The source of the first; that of each other is one more.
     pub(crate) first_source: u32,
-    /// Four channels of each.
-    pub(crate) colors: &'a mut [f32],
+    pub(crate) colors: &'a mut [[f32; 4]],
 }
 
 impl Default for Fragments {
@@ -172,7 +171,7 @@ impl Fragments {
         Shaded {
             sources: &mut self.sources[first..first + SHADED_LANES],
             first_source: colors.start as u32 | COLOR,
-            colors: self.colors[colors].as_flattened_mut(),
+            colors: &mut self.colors[colors],
         }
     }
 

@@ -21,6 +21,7 @@ mod shade;
 mod sight;
 pub mod simd;
 mod small;
+mod small_blocks;
 mod small_fragments;
 mod surfaces;
 mod tile;

@@ -19,7 +19,6 @@ use crate::bin::{PixelRect, TILE_PX, TileGrid};
 use crate::canvas::Canvas;
 use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
 use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
-use crate::transform::{Vertices, groups};
 use crate::window::{DEFAULT_BUDGET_BYTES, Windows};
 
 /// Renders on all cores. Keep it from frame to frame: it holds on to its threads and memory.
@@ -35,7 +34,6 @@ pub struct CpuRenderer {
 /// What is kept from frame to frame.
 #[derive(Debug, Default)]
 struct Memory {
-    vertices: Vertices,
     scratches: Vec<SetupScratch>,
     chunks: Vec<Chunk>,
     workers: Vec<Worker>,
@@ -87,8 +85,8 @@ struct Run<'a> {
 }
 
 /// The steps of a frame. Those of tiles run side by side: what they took together is shared out. A picture that is not
-/// filled with the background yet is filled during the first two.
-const STEPS: [&str; 5] = ["transform", "clip, setup and bin", "raster", "order", "shade and resolve"];
+/// filled with the background yet is filled during the first.
+const STEPS: [&str; 4] = ["transform, setup and bin", "raster", "order", "shade and resolve"];
 
 impl CpuRenderer {
     /// A renderer on this many threads; 0: one for each core. They are started with the first frame.
@@ -331,41 +329,29 @@ impl<'a> Run<'a> {
         let (budget_bytes, held_bytes) =
             (if is_single_tile { usize::MAX } else { self.budget_bytes }, AtomicUsize::new(0));
         let triangles_done = AtomicUsize::new(0);
-        let mut used = 0;
-        for group in groups(draws) {
-            let transform_start = Instant::now();
-            let group_draws = &draws[group.draws.clone()];
-            memory.vertices.transform(group_draws, &self.viewport, level);
-            let setup_start = Instant::now();
-            let spans = chunk_spans(group_draws, group.draws.start, chunk_triangles);
-            if chunks.len() < used + spans.len() {
-                chunks.resize_with(used + spans.len(), Chunk::default);
-            }
-            let vertices = &memory.vertices;
-            chunks[used..used + spans.len()].par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
-                if held_bytes.load(Ordering::Relaxed) > budget_bytes {
-                    *chunk = Chunk::default();
-                    return;
-                }
-                let draw_vertices = |draw: usize| vertices.draw(draw - group.draws.start);
-                let mut scratch = lock(&scratches).pop().unwrap_or_default();
-                dispatch!(level, simd => chunk.fill(simd, spans, draws, draw_vertices, grid, &mut scratch));
-                lock(&scratches).push(scratch);
-                held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
-                triangles_done.fetch_add(spans.iter().map(|span| span.count).sum(), Ordering::Relaxed);
-            });
-            used += spans.len();
-            self.steps_ms[0] += (setup_start - transform_start).as_secs_f64() * 1e3;
-            self.steps_ms[1] += setup_start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        // Meshes are cut into meshlets the first time.
+        draws.par_iter().for_each(|draw| {
+            draw.mesh.meshlets();
+        });
+        let spans = chunk_spans(draws, chunk_triangles);
+        chunks.resize_with(spans.len(), Chunk::default);
+        chunks.par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
             if held_bytes.load(Ordering::Relaxed) > budget_bytes {
-                break;
+                *chunk = Chunk::default();
+                return;
             }
-        }
-        chunks.truncate(used);
+            let mut scratch = lock(&scratches).pop().unwrap_or_default();
+            dispatch!(level, simd => chunk.fill(simd, spans, draws, grid, &mut scratch));
+            lock(&scratches).push(scratch);
+            held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
+            triangles_done.fetch_add(spans.iter().map(|span| span.triangle_count).sum(), Ordering::Relaxed);
+        });
+        self.steps_ms[0] += start.elapsed().as_secs_f64() * 1e3;
         memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);
         let bytes = held_bytes.into_inner();
         let scratch_bytes: usize = memory.scratches.iter().map(SetupScratch::bytes).sum();
-        self.note_bytes(bytes + scratch_bytes + memory.vertices.bytes());
+        self.note_bytes(bytes + scratch_bytes);
         if bytes > budget_bytes {
             return Err(triangles_done.into_inner() as f64 / self.triangles as f64);
         }
@@ -432,11 +418,11 @@ impl<'a> Run<'a> {
         memory.workers = spare.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (counts, times, capture_bytes) = results.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (elapsed, sum) = (start.elapsed().as_secs_f64() * 1e3, times.iter().sum::<Duration>().as_secs_f64());
-        for (step_ms, time) in self.steps_ms[2..].iter_mut().zip(times) {
+        for (step_ms, time) in self.steps_ms[1..].iter_mut().zip(times) {
             *step_ms += elapsed * time.as_secs_f64() / sum.max(f64::MIN_POSITIVE);
         }
         let chunk_bytes: usize = chunks.iter().map(Chunk::bytes).sum();
-        self.note_bytes(chunk_bytes + memory.vertices.bytes() + capture_bytes);
+        self.note_bytes(chunk_bytes + capture_bytes);
         counts
     }
 

@@ -1,13 +1,12 @@
 //! Textures sampled at eight coordinates: their colours, or alphas alone. The operations are those of
 //! [`Texture::sample_scaled`], in the same order.
 
-use fearless_simd::{
-    Bytes, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdInterleaved, SimdMask, f32x4, f32x8, i32x8,
-    u32x8,
-};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdFloat, SimdInt, SimdMask, f32x4, f32x8, i32x8, u32x8};
 use glam::Vec2;
 use pellucid_core::Texture;
 use pellucid_core::texture::{AlphaQuads, Filter, TexelValues, Wrap};
+
+use crate::simd::columns;
 
 /// Coordinates sampled at a time.
 const LANES: usize = 8;
@@ -27,7 +26,7 @@ impl<S: Simd> OnTexture<S> {
     pub(crate) fn sample(&self, simd: S, texture: &Texture, count: usize, wants_alpha: bool) -> [f32x8<S>; 4] {
         let Some(Levels { near, far }) = self.levels(simd, texture, count) else {
             let colors = sample_each(texture, [self.u.into(), self.v.into()], self.texels_squared.into(), count);
-            return channels(simd, colors.as_flattened());
+            return columns(simd, &colors);
         };
         let near = Footprints::new(simd, texture, near, self);
         let is_opaque = texture.is_opaque() || !wants_alpha;
@@ -187,7 +186,7 @@ impl<'a> Footprints<'a> {
 
     #[inline(always)]
     fn channels_of<S: Simd, const OPAQUE: bool>(simd: S, colors: &[[f32; 4]; LANES]) -> [f32x8<S>; 4] {
-        let [red, green, blue, alpha] = channels(simd, colors.as_flattened());
+        let [red, green, blue, alpha] = columns(simd, colors);
         [red, green, blue, if OPAQUE { f32x8::splat(simd, 1.0) } else { alpha }]
     }
 
@@ -218,15 +217,6 @@ fn texel<S: Simd, const OPAQUE: bool>(simd: S, values: &TexelValues, texel: [u8;
     let [red, green, blue, alpha] = u32::from_le_bytes(texel).to_le_bytes().map(usize::from);
     let alpha = if OPAQUE { 0.0 } else { values.alpha[alpha] };
     f32x4::load_array(simd, [values.linear[red], values.linear[green], values.linear[blue], alpha])
-}
-
-/// Colours channel by channel.
-#[inline(always)]
-pub(crate) fn channels<S: Simd>(simd: S, colors: &[f32]) -> [f32x8<S>; 4] {
-    let (low, high) = colors.split_at(LANES * 2);
-    let [red, green, blue, alpha] = f32x4::load_four_interleaved(simd, low);
-    let [high_red, high_green, high_blue, high_alpha] = f32x4::load_four_interleaved(simd, high);
-    [red.combine(high_red), green.combine(high_green), blue.combine(high_blue), alpha.combine(high_alpha)]
 }
 
 /// Texels along the sides of levels, each half as large as the one before.

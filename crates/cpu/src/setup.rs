@@ -1,17 +1,20 @@
 //! Triangles to what tiles need: small ones to fragments, others to records; what is out of sight or covers no sample is
 //! left out, eight triangles at a time, before more than its position on the screen is read.
 
+use std::ops::Range;
+
 use fearless_simd::Simd;
+use pellucid_core::meshlets::{LANES, Meshlet};
 use pellucid_core::pixel_grid::{ScreenTriangle, ScreenVertex, outcode, twice_signed_area};
 use pellucid_core::primitive::{Corners, Draw, Fold, Pass, Piece};
 use pellucid_core::shading::CornerNormals;
-use prefetch_index::prefetch_index;
 
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
-use crate::small::{self, LANES, MOST_FRAGMENTS, SmallTriangles};
-use crate::small_fragments::{NewFragments, SmallFragments};
-use crate::transform::{DrawVertices, outcode};
+use crate::small::{MOST_FRAGMENTS, make_fragments};
+use crate::small_blocks::SmallBlocks;
+use crate::small_fragments::SmallFragments;
+use crate::transform::{Vertices, outcode};
 
 /// A triangle in sight, or a piece of a clipped one.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +57,17 @@ pub(crate) struct PassBins {
 }
 
 impl PassBins {
+    fn begin(&mut self) {
+        self.records.begin();
+        self.small.begin();
+    }
+
+    /// Sorts what there is by tile.
+    fn finish(&mut self, grid: &TileGrid) {
+        self.records.finish(grid);
+        self.small.finish(grid);
+    }
+
     /// Adds how many bytes each tile needs.
     pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
         self.records.add_bytes(size_of::<Record>(), bytes);
@@ -68,129 +82,129 @@ impl PassBins {
 /// What a thread needs to fill one chunk after another.
 #[derive(Debug, Default)]
 pub(crate) struct SetupScratch {
-    opaque: NewFragments,
-    transparent: NewFragments,
+    vertices: Vertices,
+    blocks: SmallBlocks,
 }
 
 impl SetupScratch {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.opaque.bytes() + self.transparent.bytes()
+        self.blocks.bytes()
     }
 }
 
-/// Triangles between those at hand and those whose corners are fetched into the cache meanwhile.
-const FETCHED_AHEAD: usize = 4 * LANES;
-
-/// Triangles of one draw that a chunk sets up.
+/// Meshlets of one draw that a chunk sets up.
 #[derive(Debug, Clone)]
 pub(crate) struct Span {
     /// Number of the draw.
     pub(crate) draw: usize,
-    /// First of its triangles.
-    pub(crate) first: usize,
-    /// How many.
-    pub(crate) count: usize,
+    pub(crate) meshlets: Range<usize>,
+    pub(crate) triangle_count: usize,
 }
 
 /// Bytes of the budget for each triangle of a chunk. One that is being filled takes some 100 a triangle beyond the budget,
 /// which should not be much of it.
 const BUDGET_FOR_A_TRIANGLE: usize = 512;
 
-/// Triangles in a chunk: few enough for each thread to get several, so that all end at about the same time, and for the
-/// budget, but so many that tiles find something in each.
+/// Triangles in a chunk, unless a meshlet has more: few enough for each thread to get several, so that all end at about the
+/// same time, and for the budget, but so many that tiles find something in each.
 pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize, budget_bytes: usize) -> usize {
     let most = (budget_bytes / BUDGET_FOR_A_TRIANGLE).clamp(1024, 32_768);
     // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
     (total / (threads * 8)).clamp(1024, most.max(2 * tiles))
 }
 
-/// Cuts the triangles of a group's draws into chunks of `chunk_triangles`.
-pub(crate) fn chunk_spans(draws: &[Draw<'_>], first_draw: usize, chunk_triangles: usize) -> Vec<Vec<Span>> {
+/// Cuts the triangles of all draws into chunks of about `chunk_triangles`: as many meshlets as reach that number.
+pub(crate) fn chunk_spans(draws: &[Draw<'_>], chunk_triangles: usize) -> Vec<Vec<Span>> {
     let mut chunks: Vec<Vec<Span>> = Vec::new();
     let mut room = 0;
-    for (i, draw) in draws.iter().enumerate() {
-        let total = draw.mesh.triangles().len();
+    for (draw_number, draw) in draws.iter().enumerate() {
+        let meshlets = draw.mesh.meshlets();
         let mut first = 0;
-        while first < total {
+        while first < meshlets.count() {
             if room == 0 {
                 chunks.push(Vec::new());
                 room = chunk_triangles;
             }
-            let count = (total - first).min(room);
-            if let Some(chunk) = chunks.last_mut() {
-                chunk.push(Span { draw: first_draw + i, first, count });
+            let (mut end, mut triangle_count) = (first, 0);
+            while end < meshlets.count() && triangle_count < room {
+                triangle_count += meshlets.triangle_count(end);
+                end += 1;
             }
-            first += count;
-            room -= count;
+            if let Some(chunk) = chunks.last_mut() {
+                chunk.push(Span { draw: draw_number, meshlets: first..end, triangle_count });
+            }
+            first = end;
+            room = room.saturating_sub(triangle_count);
         }
     }
     chunks
 }
 
 impl Chunk {
-    /// Sets up the triangles of `spans`; `draw_vertices` gives the transformed vertices of a draw.
+    /// Sets up the triangles of `spans`.
     #[inline(always)]
-    pub(crate) fn fill<'v, S: Simd>(
+    pub(crate) fn fill<S: Simd>(
         &mut self,
         simd: S,
         spans: &[Span],
         draws: &[Draw<'_>],
-        draw_vertices: impl Fn(usize) -> DrawVertices<'v>,
         grid: &TileGrid,
         scratch: &mut SetupScratch,
     ) {
         self.records.clear();
         self.clipped.clear();
         self.dropped_triangles = 0;
-        self.opaque.records.begin();
-        self.transparent.records.begin();
+        self.opaque.begin();
+        self.transparent.begin();
+        let SetupScratch { vertices, blocks } = scratch;
+        blocks.begin(grid);
         for span in spans {
             let draw = &draws[span.draw];
-            let new = match draw.pass {
-                Pass::Opaque => &mut scratch.opaque,
-                Pass::Transparent => &mut scratch.transparent,
-            };
-            self.set_up(simd, span, draw, draw_vertices(span.draw), grid, new);
+            let meshlets = draw.mesh.meshlets();
+            for meshlet in span.meshlets.clone() {
+                let meshlet = meshlets.get(meshlet);
+                vertices.transform(simd, draw, &grid.viewport, &meshlet);
+                self.set_up(simd, draw, span.draw, &meshlet, vertices, grid, blocks);
+                if blocks.is_empty() {
+                    continue;
+                }
+                vertices.light(simd, draw, &meshlet);
+                make_fragments(
+                    simd.level(),
+                    blocks,
+                    draw,
+                    span.draw as u32,
+                    &meshlet,
+                    vertices,
+                    &mut self.bins(draw.pass).small,
+                );
+            }
         }
-        self.opaque.records.finish(grid);
-        self.transparent.records.finish(grid);
-        self.opaque.small.take(&mut scratch.opaque, grid);
-        self.transparent.small.take(&mut scratch.transparent, grid);
+        self.opaque.finish(grid);
+        self.transparent.finish(grid);
     }
 
+    /// Sets up the triangles of a meshlet: those that are small become blocks, others records.
     #[inline(always)]
     fn set_up<S: Simd>(
         &mut self,
         simd: S,
-        span: &Span,
         draw: &Draw<'_>,
-        vertices: DrawVertices<'_>,
+        draw_number: usize,
+        meshlet: &Meshlet<'_>,
+        vertices: &Vertices,
         grid: &TileGrid,
-        new: &mut NewFragments,
+        blocks: &mut SmallBlocks,
     ) {
-        let all = &draw.mesh.triangles()[span.first..span.first + span.count];
-        let mut small = SmallTriangles::default();
         let mut sight = Sight::default();
-        let normals = draw.mesh.normals().filter(|_| draw.lit).unwrap_or_default();
-        for start in (0..all.len()).step_by(LANES) {
-            // The other corners are mostly those of neighbours.
-            for &[vertex, ..] in all.iter().skip(start + FETCHED_AHEAD).take(LANES) {
-                prefetch_index(vertices.positions, vertex as usize);
-            }
-            let padded;
-            let triangles = match all[start..].first_chunk::<LANES>() {
-                Some(triangles) => triangles,
-                None => {
-                    padded = padded_triangles(&all[start..]);
-                    &padded
-                }
-            };
-            let first = span.first + start;
-            sight.look(simd, triangles, vertices.positions, draw, grid);
+        for (eight, corners) in meshlet.corners.iter().enumerate() {
+            let first = meshlet.first_triangle + eight * LANES;
+            sight.look(simd, corners, &vertices.positions, draw, grid);
             let mut records = sight.others;
-            if all.len() - start < LANES {
-                records &= (1 << (all.len() - start)) - 1;
+            let count = meshlet.triangle_count - eight * LANES;
+            if count < LANES {
+                records &= (1 << count) - 1;
             }
             if draw.varies() {
                 records |= sight.small;
@@ -203,26 +217,25 @@ impl Chunk {
                         records |= 1 << lane;
                         continue;
                     }
-                    let [a, b, c] = triangles[lane];
-                    let corners = if sight.swapped >> lane & 1 != 0 { [a, c, b] } else { [a, b, c] };
-                    small::fetch(corners, vertices.depths, normals);
-                    let mut push = |number| {
-                        let (block, covered) = sight.block(number, lane);
-                        if covered != 0 && small.push(first + lane, corners, block, covered) {
-                            small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
-                        }
-                    };
-                    push(0);
-                    (1..sight.block_count).for_each(push);
+                    let triangle =
+                        ((eight * LANES + lane) as u16, [corners[0][lane], corners[1][lane], corners[2][lane]]);
+                    if sight.in_parts >> lane & 1 == 0 {
+                        blocks.push(sight.tiles[lane], sight.places[lane], sight.covered(lane), triangle);
+                        continue;
+                    }
+                    for number in 0..sight.block_count {
+                        let (first, covered) = sight.block(number, lane);
+                        blocks.push_any(first, covered, triangle, grid);
+                    }
                 }
             }
             while records != 0 {
-                let lane = records.trailing_zeros() as usize;
+                let lane = records.trailing_zeros() as usize % LANES;
                 records &= records - 1;
-                self.set_up_record(span.draw, draw, first + lane, triangles[lane], vertices, grid);
+                let corners = [corners[0][lane], corners[1][lane], corners[2][lane]];
+                self.set_up_record(draw_number, draw, first + lane, corners, vertices, grid);
             }
         }
-        small.flush(simd.level(), draw, span.draw as u32, vertices, grid, new);
     }
 
     #[inline(always)]
@@ -240,11 +253,11 @@ impl Chunk {
         draw_number: usize,
         draw: &Draw<'_>,
         triangle: usize,
-        indices: [u32; 3],
-        vertices: DrawVertices<'_>,
+        corners: [u16; 3],
+        vertices: &Vertices,
         grid: &TileGrid,
     ) {
-        let codes = indices.map(|vertex| outcode(vertices.positions[vertex as usize]));
+        let codes = corners.map(|vertex| outcode(vertices.positions[usize::from(vertex)]));
         let any = codes[0] | codes[1] | codes[2];
         if any != 0 {
             if any & outcode::NOT_FINITE != 0 {
@@ -254,7 +267,7 @@ impl Chunk {
             }
             return;
         }
-        let mut corners = indices.map(|vertex| vertices.vertex(vertex));
+        let mut corners = corners.map(|vertex| vertices.vertex(vertex));
         let area = twice_signed_area(corners);
         if area == 0 || !draw.shows_side(area) {
             return;
@@ -339,14 +352,6 @@ impl Chunk {
             + self.opaque.bytes()
             + self.transparent.bytes()
     }
-}
-
-/// A few triangles, and others without area, which are never small and in sight.
-#[cold]
-fn padded_triangles(few: &[[u32; 3]]) -> [[u32; 3]; LANES] {
-    let mut padded = [[few[0][0]; 3]; LANES];
-    padded[..few.len()].copy_from_slice(few);
-    padded
 }
 
 /// Whether a triangle covers one pixel.

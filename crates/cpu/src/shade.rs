@@ -5,11 +5,8 @@
 //! surfaces are translucent, and jumps from texture to texture. The operations are those of [`Varying::color_at`], in the
 //! same order.
 
-use fearless_simd::{
-    Bytes, Level, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdInterleaved, SimdMask, SimdNarrow,
-    SimdSplit, SimdWiden,
-};
-use fearless_simd::{dispatch, f32x4, f32x8, f64x8, i32x8, mask32x8, u32x8};
+use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, SimdFloat, SimdInt, SimdMask};
+use fearless_simd::{dispatch, f32x8, f64x8, i32x8, mask32x8, u32x8};
 use glam::Vec2;
 use pellucid_core::Texture;
 use pellucid_core::pixel_grid::Plane;
@@ -18,7 +15,8 @@ use pellucid_core::shading::{GREATEST_COLOR, Varying, slope};
 
 use crate::bin::TILE_PX;
 use crate::fragments::Fragments;
-use crate::sample::{OnTexture, channels};
+use crate::sample::OnTexture;
+use crate::simd::{columns, narrow, rows, widen};
 use crate::tile::TILE_SAMPLES;
 
 /// Fragments shaded at a time.
@@ -108,7 +106,7 @@ impl Unshaded {
                     let channel = interpolate([corners[0][i], corners[1][i], corners[2][i]], weights) * w;
                     color[i] = channel * draw.material.base_color[i];
                 }
-                store_colors(color, self.colors[to..to + LANES].as_flattened_mut());
+                rows(simd, color, &mut self.colors[to..to + LANES]);
             }
             if let (Some(corners), Some((texture, _))) = (varying.tex_coords, draw.texture) {
                 let u = interpolate(corners.map(|corner| corner.x), weights) * w;
@@ -145,7 +143,7 @@ impl Unshaded {
             let Some(passes) = passes else {
                 let to = fragments.shaded(start, count);
                 (lanes + to.first_source).store_slice(to.sources);
-                store_colors(colors, to.colors);
+                rows(simd, colors, to.colors);
                 kept += count;
                 continue;
             };
@@ -157,7 +155,7 @@ impl Unshaded {
             (lanes + to.first_source).store_slice(to.sources);
             let [red, green, blue, alpha] = colors;
             let colors = [red.compress(passes), green.compress(passes), blue.compress(passes), alpha.compress(passes)];
-            store_colors(colors, to.colors);
+            rows(simd, colors, to.colors);
             kept += passed;
         }
         fragments.truncate(kept);
@@ -216,7 +214,7 @@ impl Unshaded {
         let wants_alpha = draw.blends || cutoff.is_some();
         let mut color = [f32x8::splat(simd, 0.0); 4];
         if draw.mesh.colors().is_some() {
-            color = channels(simd, self.colors[at..at + LANES].as_flattened());
+            color = columns(simd, &self.colors[at..at + LANES]);
         } else {
             for i in 0..4 {
                 color[i] = f32x8::splat(simd, base[i]);
@@ -290,27 +288,16 @@ impl VaryingSurface<'_> {
 /// From integers below 2^24, which f32 holds exactly.
 #[inline(always)]
 fn to_f64<S: Simd>(values: i32x8<S>) -> f64x8<S> {
-    let (low, high) = values.to_float::<f32x8<S>>().widen();
-    low.combine(high)
+    widen(values.to_float())
 }
 
 /// A plane rounded to f32, as [`Plane::at`].
 #[inline(always)]
 fn plane_at<S: Simd>(plane: &Plane, x: f64x8<S>, y: f64x8<S>) -> f32x8<S> {
-    let (low, high) = ((y * plane.dy + plane.value) + x * plane.dx).split();
-    low.narrow(high)
+    narrow((y * plane.dy + plane.value) + x * plane.dx)
 }
 
 #[inline(always)]
 fn interpolate<S: Simd>([a, b, c]: [f32; 3], [first, second, third]: [f32x8<S>; 3]) -> f32x8<S> {
     (first * a + second * b) + third * c
-}
-
-/// Colours from channels.
-#[inline(always)]
-fn store_colors<S: Simd>([red, green, blue, alpha]: [f32x8<S>; 4], colors: &mut [f32]) {
-    let (red, green, blue, alpha) = (red.split(), green.split(), blue.split(), alpha.split());
-    let (low, high) = colors.split_at_mut(LANES * 2);
-    f32x4::store_four_interleaved([red.0, green.0, blue.0, alpha.0], low);
-    f32x4::store_four_interleaved([red.1, green.1, blue.1, alpha.1], high);
 }

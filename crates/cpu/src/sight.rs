@@ -2,17 +2,22 @@
 
 use std::hint::black_box;
 
-use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdMask, i32x8, u64x8};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdMask, i32x8, u32x8, u64x8};
+use pellucid_core::meshlets::LANES;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
-use crate::bin::TileGrid;
-use crate::small::{BLOCK_PX, LANES, MOST_FRAGMENTS, gather_pairs};
-use crate::transform::OUTSIDE;
+use crate::bin::{TILE_PX, TileGrid};
+use crate::simd::{each_lane, unzip};
+use crate::small::MOST_FRAGMENTS;
+use crate::small_blocks::{BLOCK_PX, COLUMN_BITS};
+use crate::transform::{OUTSIDE, VERTICES};
 
 /// A triangle less than so many subpixels wide and high is small: at most two blocks a side. Edge values then fit 32 bits
 /// with ease, and sides and area fit f32.
 const SMALL_SUBPIXELS: i32 = 2 * BLOCK_PX * SUBPIXELS;
+
+const TILE_BITS: u32 = TILE_PX.ilog2();
 
 /// Blocks of samples that a small triangle may reach.
 const BLOCKS: usize = 4;
@@ -26,11 +31,12 @@ pub(crate) struct Sight {
     pub(crate) maybe_many: u32,
     /// Others that may be in sight: large ones, and those with a corner that cannot be projected.
     pub(crate) others: u32,
-    /// Small ones that run counter-clockwise on the screen.
-    pub(crate) swapped: u32,
-    /// First sample of the small ones' bounds, in the window.
-    left: [i32; LANES],
-    top: [i32; LANES],
+    /// Small ones whose bounds reach into several tiles or blocks.
+    pub(crate) in_parts: u32,
+    /// The first sample of the small ones' bounds, as in [`SmallBlock`](crate::small_blocks::SmallBlock), and the tile it is
+    /// in.
+    pub(crate) places: [u32; LANES],
+    pub(crate) tiles: [u32; LANES],
     /// Blocks that one of the small ones reaches, from each one's first sample on.
     pub(crate) block_count: usize,
     blocks: [Block; BLOCKS],
@@ -47,20 +53,20 @@ struct Block {
 }
 
 impl Sight {
-    /// Looks at eight triangles of a draw.
+    /// Looks at eight triangles of a draw: at the vertices that are their corners.
     #[inline(always)]
     pub(crate) fn look<S: Simd>(
         &mut self,
         simd: S,
-        triangles: &[[u32; 3]; LANES],
-        positions: &[[i32; 2]],
+        [a, b, c]: &[[u16; LANES]; 3],
+        positions: &[[i32; 2]; VERTICES],
         draw: &Draw<'_>,
         grid: &TileGrid,
     ) {
         let zero = i32x8::splat(simd, 0);
-        let [ax, ay]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 0, positions);
-        let [bx, by]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 1, positions);
-        let [cx, cy]: [i32x8<S>; 2] = gather_pairs(simd, triangles, 2, positions);
+        let [ax, ay]: [i32x8<S>; 2] = unzip(simd, each_lane(|lane| positions[usize::from(a[lane])]));
+        let [bx, by]: [i32x8<S>; 2] = unzip(simd, each_lane(|lane| positions[usize::from(b[lane])]));
+        let [cx, cy]: [i32x8<S>; 2] = unzip(simd, each_lane(|lane| positions[usize::from(c[lane])]));
         let outside = ax.simd_eq(OUTSIDE) | bx.simd_eq(OUTSIDE) | cx.simd_eq(OUTSIDE);
         let (min_x, min_y) = (ax.min(bx).min(cx), ay.min(by).min(cy));
         let (max_x, max_y) = (ax.max(bx).max(cx), ay.max(by).max(cy));
@@ -82,13 +88,17 @@ impl Sight {
         let leaves_window = (leaves_window & small).any_true();
         self.small = small.to_bitmask() as u32;
         self.others = others.to_bitmask() as u32;
-        self.swapped = swapped.to_bitmask() as u32;
         self.maybe_many = 0;
         self.block_count = 0;
         if self.small == 0 {
             return;
         }
-        (self.left, self.top) = (left.into(), top.into());
+        self.places = ((top << COLUMN_BITS) | left).bitcast::<u32x8<S>>().into();
+        let (column, row) = ((left - grid.window.left) >> TILE_BITS, (top - grid.window.top) >> TILE_BITS);
+        self.tiles = (row * grid.columns as i32 + column).bitcast::<u32x8<S>>().into();
+        let leaves_tile =
+            (left >> TILE_BITS).simd_lt(right >> TILE_BITS) | (top >> TILE_BITS).simd_lt(bottom >> TILE_BITS);
+        self.in_parts = leaves_tile.to_bitmask() as u32;
         let (bx, cx) = (swapped.select(cx, bx), swapped.select(bx, cx));
         let (by, cy) = (swapped.select(cy, by), swapped.select(by, cy));
         let (width, height) = (right - left + 1, bottom - top + 1);
@@ -124,6 +134,7 @@ impl Sight {
             self.leave_out_beyond(&width.into(), &height.into());
         }
         if self.block_count > 1 {
+            self.in_parts = self.small;
             self.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
         }
     }
@@ -147,7 +158,14 @@ impl Sight {
     #[inline(always)]
     pub(crate) fn block(&self, number: usize, lane: usize) -> ([i32; 2], u64) {
         let Block { across, down, covered } = &self.blocks[number % BLOCKS];
-        ([self.left[lane] + across, self.top[lane] + down], covered[lane])
+        let place = self.places[lane] as i32;
+        ([(place & ((1 << COLUMN_BITS) - 1)) + across, (place >> COLUMN_BITS) + down], covered[lane])
+    }
+
+    /// Which samples of the first block a triangle covers.
+    #[inline(always)]
+    pub(crate) fn covered(&self, lane: usize) -> u64 {
+        self.blocks[0].covered[lane]
     }
 
     /// How many samples a small triangle covers.

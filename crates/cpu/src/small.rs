@@ -1,112 +1,76 @@
-//! Small triangles to fragments, as soon as sixteen wait.
+//! Small triangles to fragments, as soon as those of a meshlet are known.
 //!
-//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up, eight at
-//! a time, of as many triangles as that takes. All that is left for the tile is to order and blend them. A triangle that
-//! reaches several blocks of samples takes part once for each.
+//! A triangle of few fragments is not worth a place in the bins. Its fragments are made and lit right after set-up, while the
+//! meshlet's vertices are in the cache, eight at a time, of as many triangles as that takes. All that is left for
+//! the tile is to order and blend them. A triangle that reaches several blocks of samples takes part once for each.
 
-use fearless_simd::{
-    Bytes, Level, Simd, SimdBase, SimdCombine, SimdInt, SimdInterleaved, SimdSplit, SimdWiden, dispatch,
-};
-use fearless_simd::{f32x8, f64x4, f64x8, i32x8, u16x8, u32x4, u32x8};
+use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdCombine, SimdInt, SimdNarrow, SimdSplit, SimdWiden, dispatch};
+use fearless_simd::{f32x8, f64x8, i32x8, u16x8, u32x8};
 use glam::Vec3;
+use pellucid_core::meshlets::{LANES, Meshlet};
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
-use prefetch_index::prefetch_index;
 
-use crate::bin::{TILE_PX, TileGrid};
-use crate::simd::{Lookup, light, narrow, widen, words};
-use crate::small_fragments::{NewFragments, SAMPLE_BITS, SmallFragment};
-use crate::transform::DrawVertices;
-
-/// Triangles that wait until fragments are made.
-const WAITING: usize = 16;
-
-/// Triangles side by side: one to a lane.
-pub(crate) const LANES: usize = 8;
-
-/// Side of a block of samples.
-pub(crate) const BLOCK_PX: i32 = 8;
+use crate::bin::TILE_PX;
+use crate::simd::{Lookup, columns, each_lane, light, narrow, rows, unzip, wide, widen, words};
+use crate::small_blocks::{BLOCK_BITS, BLOCK_PX, COLUMN_BITS, SmallBlock, SmallBlocks};
+use crate::small_fragments::{SmallFragment, SmallFragments};
+use crate::transform::{Vertices, in_view};
 
 /// Most fragments of a small triangle. One that has more is a record: it takes less room, and a tile makes fragments side
 /// by side as fast.
 pub(crate) const MOST_FRAGMENTS: u32 = 32;
 
-/// Small triangles, or blocks of them, that wait to be sixteen.
-#[derive(Debug, Default)]
-pub(crate) struct SmallTriangles {
-    count: usize,
-    /// Corners, clockwise on the screen.
-    corners: [[u32; 3]; WAITING],
-    /// Number of the triangle in the draw's mesh.
-    triangles: [u32; WAITING],
-    /// The first sample of the block ...
-    left: [i32; WAITING],
-    top: [i32; WAITING],
-    /// ... and which ones of it are covered, row by row.
-    covered: [u64; WAITING],
-    /// What eight of them cover.
-    samples: Samples,
+/// Turns blocks of samples of a meshlet, of which there are none then, into fragments. A function of its own: inlined into
+/// the loop over triangles, its conditions on the draw would be taken out of that loop one by one, for minutes of compile
+/// time.
+#[inline(never)]
+pub(crate) fn make_fragments(
+    level: Level,
+    blocks: &mut SmallBlocks,
+    draw: &Draw<'_>,
+    draw_number: u32,
+    meshlet: &Meshlet<'_>,
+    vertices: &Vertices,
+    fragments: &mut SmallFragments,
+) {
+    blocks.sort_by_tile(&mut fragments.runs);
+    dispatch!(level, simd => make_simd(simd, blocks, draw, draw_number, meshlet, vertices, fragments));
+    blocks.clear();
 }
 
-impl SmallTriangles {
-    /// Adds a triangle; returns whether there are sixteen.
-    #[inline(always)]
-    pub(crate) fn push(&mut self, triangle: usize, corners: [u32; 3], [left, top]: [i32; 2], covered: u64) -> bool {
-        let lane = self.count;
-        self.corners[lane] = corners;
-        self.triangles[lane] = triangle as u32;
-        self.left[lane] = left;
-        self.top[lane] = top;
-        self.covered[lane] = covered;
-        self.count += 1;
-        self.count == WAITING
-    }
-
-    /// Turns the triangles into fragments. A function of its own: inlined into the loop over triangles, its conditions on
-    /// the draw would be taken out of that loop one by one, for minutes of compile time.
-    #[inline(never)]
-    pub(crate) fn flush(
-        &mut self,
-        level: Level,
-        draw: &Draw<'_>,
-        draw_number: u32,
-        vertices: DrawVertices<'_>,
-        grid: &TileGrid,
-        fragments: &mut NewFragments,
-    ) {
-        dispatch!(level, simd => self.flush_simd(simd, draw, draw_number, vertices, grid, fragments));
-    }
-
-    #[inline(always)]
-    fn flush_simd<S: Simd>(
-        &mut self,
-        simd: S,
-        draw: &Draw<'_>,
-        draw_number: u32,
-        vertices: DrawVertices<'_>,
-        grid: &TileGrid,
-        fragments: &mut NewFragments,
-    ) {
-        let count = std::mem::take(&mut self.count);
-        for first in (0..count).step_by(LANES) {
-            let triangles = Triangles::new(simd, self, first, draw, vertices);
-            self.samples.put_down(&self.covered[first..count.min(first + LANES)]);
-            let (new_places, new_fragments) = fragments.add(self.samples.count, LANES);
-            let samples = self.samples.numbers[..self.samples.count.next_multiple_of(LANES)].as_chunks().0;
-            let room = new_places.chunks_exact_mut(LANES).zip(new_fragments.chunks_exact_mut(LANES));
-            for (samples, (places, fragments)) in samples.iter().zip(room) {
-                triangles.make_fragments(simd, samples, draw_number, grid, places, fragments);
-            }
+#[inline(always)]
+fn make_simd<S: Simd>(
+    simd: S,
+    blocks: &mut SmallBlocks,
+    draw: &Draw<'_>,
+    draw_number: u32,
+    meshlet: &Meshlet<'_>,
+    vertices: &Vertices,
+    fragments: &mut SmallFragments,
+) {
+    let mut left = blocks.len();
+    let (sorted, samples) = blocks.sorted();
+    for blocks in sorted {
+        let triangles = Triangles::new(simd, blocks, draw, meshlet, vertices);
+        samples.put_down(&blocks[..left.min(LANES)]);
+        left = left.saturating_sub(LANES);
+        let (new_samples, new_fragments) = fragments.add(samples.count, LANES);
+        let numbers = samples.numbers[..samples.count.next_multiple_of(LANES)].as_chunks().0;
+        let room = new_samples.as_chunks_mut().0.iter_mut().zip(new_fragments.as_chunks_mut().0);
+        for (numbers, (new_samples, new_fragments)) in numbers.iter().zip(room) {
+            triangles.make_fragments(simd, numbers, draw_number, new_samples, new_fragments);
         }
     }
 }
 
 /// What fragments of eight triangles are made of.
 struct Triangles<S: Simd> {
-    /// Column and row of the block's first sample.
-    first: [i32x8<S>; 2],
-    /// Column and row of the triangle's anchor.
-    anchor: [i32x8<S>; 2],
+    /// The block's first sample in its tile.
+    first: i32x8<S>,
+    /// Pixels from the triangle's anchor to the block's first sample.
+    x: i32x8<S>,
+    y: i32x8<S>,
     depth: Plane<[u32x8<S>; 2]>,
     least_depth: f32x8<S>,
     greatest_depth: f32x8<S>,
@@ -127,51 +91,45 @@ struct Plane<T> {
 }
 
 impl<S: Simd> Triangles<S> {
-    /// Those from number `first` on; where there are fewer than eight, others that were there before.
+    /// Those of eight blocks.
     #[inline(always)]
-    fn new(simd: S, all: &SmallTriangles, first: usize, draw: &Draw<'_>, vertices: DrawVertices<'_>) -> Self {
-        let corners: &[[u32; 3]; LANES] = eight(&all.corners, first);
-        let numbers: &[u32; LANES] = eight(&all.triangles, first);
-        // All of one length, so that a corner is known to be in each if it is in one.
-        let count = draw.mesh.positions().len();
-        let (positions, depths) = (&vertices.positions[..count], &vertices.depths[..count]);
-        // The planes of weights and of depth, as `ScreenTriangle` has them.
-        let a: [i32x8<S>; 2] = gather_pairs(simd, corners, 0, positions);
-        let b: [i32x8<S>; 2] = gather_pairs(simd, corners, 1, positions);
-        let c: [i32x8<S>; 2] = gather_pairs(simd, corners, 2, positions);
+    fn new(simd: S, blocks: &[SmallBlock; LANES], draw: &Draw<'_>, meshlet: &Meshlet<'_>, vertices: &Vertices) -> Self {
+        let numbers = u32x8::load_array(simd, each_lane(|lane| u32::from(blocks[lane].triangle)));
+        // The planes of weights and of depth, as `ScreenTriangle` has them. Corners need not run clockwise: if they do not, area
+        // and weights are negated, and the second and third weight change places, of which neither changes a bit.
+        let (a, lit_a) = corners_at(simd, blocks, 0, vertices);
+        let (b, lit_b) = corners_at(simd, blocks, 1, vertices);
+        let (c, lit_c) = corners_at(simd, blocks, 2, vertices);
         let anchor = [a[0] >> 8, a[1] >> 8];
         let at = [(anchor[0] << 8) + center(0), (anchor[1] << 8) + center(0)];
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
         let inv_area = f64x8::splat(simd, 1.0) / wide(area);
         let second = weight_plane(simd, c, a, at, inv_area);
         let third = weight_plane(simd, a, b, at, inv_area);
-        let [a_z, a_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 0, depths);
-        let [b_z, b_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 1, depths);
-        let [c_z, c_inv_w]: [f32x8<S>; 2] = gather_pairs(simd, corners, 2, depths);
-        let first_z = widen(a_z);
-        let (to_second, to_third) = (widen(b_z) - first_z, widen(c_z) - first_z);
 
         let mut steady_light = f32x8::splat(simd, 1.0);
         let mut normal = None;
-        if draw.lit
-            && let Some(normals) = draw.mesh.normals()
-        {
-            let normals = &normals[..count];
-            let a = in_view(draw, gather(simd, |lane| normals[corners[lane][0] as usize]));
-            let b = in_view(draw, gather(simd, |lane| normals[corners[lane][1] as usize]));
-            let c = in_view(draw, gather(simd, |lane| normals[corners[lane][2] as usize]));
+        if draw.lit && draw.mesh.normals().is_some() {
             let weights = [narrow_plane(&second), narrow_plane(&third)];
             normal = Some([
-                normal_plane(a[0] * a_inv_w, b[0] * b_inv_w, c[0] * c_inv_w, &weights),
-                normal_plane(a[1] * a_inv_w, b[1] * b_inv_w, c[1] * c_inv_w, &weights),
-                normal_plane(a[2] * a_inv_w, b[2] * b_inv_w, c[2] * c_inv_w, &weights),
+                normal_plane(lit_a[1], lit_b[1], lit_c[1], &weights),
+                normal_plane(lit_a[2], lit_b[2], lit_c[2], &weights),
+                normal_plane(lit_a[3], lit_b[3], lit_c[3], &weights),
             ]);
         } else if draw.lit {
-            steady_light = light(simd, in_view(draw, gather(simd, |lane| flat_normal(draw, numbers[lane]))));
+            steady_light =
+                light(simd, in_view(draw, flat_normals(simd, numbers + meshlet.first_triangle as u32, draw)));
         }
+        let [a_z, b_z, c_z] = [lit_a[0], lit_b[0], lit_c[0]];
+        let first_z = widen(a_z);
+        let (to_second, to_third) = (widen(b_z) - first_z, widen(c_z) - first_z);
+        let places = i32x8::load_array(simd, each_lane(|lane| blocks[lane].place as i32));
+        let (left, top) = (places & ((1 << COLUMN_BITS) - 1), places >> COLUMN_BITS);
+        let last = TILE_PX as i32 - 1;
         Self {
-            first: [&all.left, &all.top].map(|first_of_all| i32x8::load_array(simd, *eight(first_of_all, first))),
-            anchor,
+            first: ((top & last) << TILE_PX.ilog2()) | (left & last),
+            x: left - anchor[0],
+            y: top - anchor[1],
             depth: Plane {
                 value: words(first_z + (second.value * to_second + third.value * to_third)),
                 dx: words(second.dx * to_second + third.dx * to_third),
@@ -181,7 +139,7 @@ impl<S: Simd> Triangles<S> {
             greatest_depth: a_z.max(b_z).max(c_z),
             normal,
             steady_light,
-            primitive: u32x8::load_array(simd, *numbers) + draw.first_primitive,
+            primitive: numbers + (meshlet.first_triangle as u32 + draw.first_primitive),
         }
     }
 
@@ -190,27 +148,23 @@ impl<S: Simd> Triangles<S> {
     fn make_fragments(
         &self,
         simd: S,
-        samples: &[u16; LANES],
+        numbers: &[u16; LANES],
         draw_number: u32,
-        grid: &TileGrid,
-        places: &mut [u32],
-        fragments: &mut [SmallFragment],
+        samples: &mut [u16; LANES],
+        fragments: &mut [SmallFragment; LANES],
     ) {
-        let (low, high) = u16x8::load_array_ref(simd, samples).widen();
-        let samples: u32x8<S> = low.combine(high);
-        let lookup = Lookup::new(simd, samples >> BLOCK_BITS);
-        let bit: i32x8<S> = (samples & ((1 << BLOCK_BITS) - 1)).bitcast();
-        let x = lookup.ints(self.first[0]) + (bit & (BLOCK_PX - 1));
-        let y = lookup.ints(self.first[1]) + (bit >> 3);
+        let (low, high) = u16x8::load_array_ref(simd, numbers).widen();
+        let numbers: u32x8<S> = low.combine(high);
+        let lookup = Lookup::new(simd, numbers >> BLOCK_BITS);
+        let bit: i32x8<S> = (numbers & ((1 << BLOCK_BITS) - 1)).bitcast();
+        let (column, row) = (bit & (BLOCK_PX - 1), bit >> BLOCK_PX.ilog2());
 
-        let (column, row) = (x - grid.window.left, y - grid.window.top);
-        let tile = (row >> 5) * grid.columns as i32 + (column >> 5);
-        let last = TILE_PX as i32 - 1;
-        let place = (tile << SAMPLE_BITS) | ((row & last) << 5) | (column & last);
-        place.bitcast::<u32x8<S>>().store_slice(places);
+        let sample = lookup.ints(self.first) + ((row << TILE_PX.ilog2()) | column);
+        let (low, high) = sample.bitcast::<u32x8<S>>().split();
+        low.narrow(high).store_slice(samples);
 
-        let x: f32x8<S> = (x - lookup.ints(self.anchor[0])).to_float();
-        let y: f32x8<S> = (y - lookup.ints(self.anchor[1])).to_float();
+        let x: f32x8<S> = (lookup.ints(self.x) + column).to_float();
+        let y: f32x8<S> = (lookup.ints(self.y) + row).to_float();
         let (value, dx, dy) = (lookup.wide(self.depth.value), lookup.wide(self.depth.dx), lookup.wide(self.depth.dy));
         let depth = narrow((value + widen(y) * dy) + widen(x) * dx);
         let (least, greatest) = (lookup.floats(self.least_depth), lookup.floats(self.greatest_depth));
@@ -222,73 +176,9 @@ impl<S: Simd> Triangles<S> {
                 light(simd, [looked_up(&lookup, nx, x, y), looked_up(&lookup, ny, x, y), looked_up(&lookup, nz, x, y)])
             }
         };
-        let (depth, light) = (depth.bitcast::<u32x8<S>>().split(), light.bitcast::<u32x8<S>>().split());
-        let (primitive, draw) = (lookup.words(self.primitive).split(), u32x4::splat(simd, draw_number));
-        let (first, second) = bytemuck::cast_slice_mut(fragments).split_at_mut(LANES / 2 * 4);
-        u32x4::store_four_interleaved([depth.0, light.0, primitive.0, draw], first);
-        u32x4::store_four_interleaved([depth.1, light.1, primitive.1, draw], second);
-    }
-}
-
-/// Eight in a row.
-#[inline(always)]
-fn eight<T>(all: &[T; WAITING], first: usize) -> &[T; LANES] {
-    &all.as_chunks().0[first / LANES]
-}
-
-/// Bits of a sample's number in its block.
-const BLOCK_BITS: u32 = 6;
-
-/// Samples that eight triangles cover, triangle by triangle.
-#[derive(Debug)]
-struct Samples {
-    /// Number in the block, above it the triangle's lane; beyond `count` anything.
-    numbers: [u16; LANES << BLOCK_BITS],
-    count: usize,
-}
-
-impl Default for Samples {
-    fn default() -> Self {
-        Self { numbers: [0; LANES << BLOCK_BITS], count: 0 }
-    }
-}
-
-/// Samples of a triangle that are put down without asking whether there are as many: what asks is often mispredicted.
-const WITHOUT_ASKING: usize = 4;
-
-impl Samples {
-    /// Puts down which samples are covered.
-    #[inline(always)]
-    fn put_down(&mut self, covered: &[u64]) {
-        self.count = 0;
-        for (lane, &covered) in covered.iter().enumerate() {
-            let lane = (lane << BLOCK_BITS) as u16;
-            let mut bits = covered;
-            let mut at = self.count;
-            for number in &mut self.numbers[at..at + WITHOUT_ASKING] {
-                *number = lane | (bits.trailing_zeros() as u16 & ((1 << BLOCK_BITS) - 1));
-                bits &= bits.wrapping_sub(1);
-            }
-            while bits != 0 {
-                self.numbers[at + WITHOUT_ASKING] = lane | bits.trailing_zeros() as u16;
-                bits &= bits - 1;
-                at += 1;
-            }
-            self.count += covered.count_ones() as usize;
-        }
-    }
-}
-
-/// Fetches into the cache what making fragments of a triangle takes beside the positions of its corners.
-#[inline(always)]
-pub(crate) fn fetch(corners: [u32; 3], depths: &[[f32; 2]], normals: &[Vec3]) {
-    for corner in corners {
-        prefetch_index(depths, corner as usize);
-    }
-    if !normals.is_empty() {
-        for corner in corners {
-            prefetch_index(normals, corner as usize);
-        }
+        let draw = f32x8::splat(simd, f32::from_bits(draw_number));
+        let fields = [depth, light, lookup.words(self.primitive).bitcast(), draw];
+        rows(simd, fields, bytemuck::cast_slice_mut(fragments));
     }
 }
 
@@ -303,18 +193,7 @@ fn weight_plane<S: Simd>(
 ) -> Plane<f64x8<S>> {
     let (a, b) = (from_y - to_y, to_x - from_x);
     let step = f64x8::splat(simd, f64::from(SUBPIXELS)) * inv_area;
-    let (low, high) = (a * (x - from_x) + b * (y - from_y)).widen();
-    Plane {
-        value: low.to_float::<f64x4<S>>().combine(high.to_float::<f64x4<S>>()) * inv_area,
-        dx: wide(a) * step,
-        dy: wide(b) * step,
-    }
-}
-
-/// In f64, integers below 2^24, which f32 holds exactly.
-#[inline(always)]
-fn wide<S: Simd>(values: i32x8<S>) -> f64x8<S> {
-    widen(values.to_float())
+    Plane { value: wide(a * (x - from_x) + b * (y - from_y)) * inv_area, dx: wide(a) * step, dy: wide(b) * step }
 }
 
 /// Rounded to nearest.
@@ -357,44 +236,27 @@ fn unit(edge: Vec3) -> Vec3 {
     edge / edge.abs().max_element().max(f32::MIN_POSITIVE)
 }
 
-/// What there is for each lane. Written out, so that it goes to registers: vectors that are loaded from where their lanes
-/// have just been stored wait for it.
+/// A corner of triangles: where it is, how deep, and the normal there over w.
 #[inline(always)]
-fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; LANES] {
-    [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
-}
-
-/// A vector for each of eight lanes, as structure of arrays.
-#[inline(always)]
-fn gather<S: Simd>(simd: S, vector: impl Fn(usize) -> Vec3) -> [f32x8<S>; 3] {
-    let vectors = each_lane(vector);
-    [
-        f32x8::load_array(simd, each_lane(|lane| vectors[lane].x)),
-        f32x8::load_array(simd, each_lane(|lane| vectors[lane].y)),
-        f32x8::load_array(simd, each_lane(|lane| vectors[lane].z)),
-    ]
-}
-
-/// Pairs of numbers at one corner of each triangle.
-#[inline(always)]
-pub(crate) fn gather_pairs<S: Simd, V: SimdBase<S>>(
+fn corners_at<S: Simd>(
     simd: S,
-    corners: &[[u32; 3]; LANES],
+    blocks: &[SmallBlock; LANES],
     k: usize,
-    from: &[[V::Element; 2]],
-) -> [V; 2] {
-    let pairs = each_lane(|lane| from[corners[lane][k] as usize]);
-    let (low, high) = pairs.as_flattened().split_at(LANES);
-    V::from_slice(simd, low).deinterleave(V::from_slice(simd, high)).into()
+    vertices: &Vertices,
+) -> ([i32x8<S>; 2], [f32x8<S>; 4]) {
+    let vertex = |lane: usize| usize::from(blocks[lane].corners[k]);
+    let positions = unzip(simd, each_lane(|lane| vertices.positions[vertex(lane)]));
+    (positions, columns(simd, &each_lane(|lane| vertices.lit[vertex(lane)])))
 }
 
-/// Normals in camera space.
+/// The geometric normals of triangles of a draw's mesh.
 #[inline(always)]
-fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
-    let matrix = &draw.view_from_normal;
+fn flat_normals<S: Simd>(simd: S, triangles: u32x8<S>, draw: &Draw<'_>) -> [f32x8<S>; 3] {
+    let triangles: [u32; LANES] = triangles.into();
+    let normals = each_lane(|lane| flat_normal(draw, triangles[lane]));
     [
-        (x * matrix.x_axis.x + y * matrix.y_axis.x) + z * matrix.z_axis.x,
-        (x * matrix.x_axis.y + y * matrix.y_axis.y) + z * matrix.z_axis.y,
-        (x * matrix.x_axis.z + y * matrix.y_axis.z) + z * matrix.z_axis.z,
+        f32x8::load_array(simd, each_lane(|lane| normals[lane].x)),
+        f32x8::load_array(simd, each_lane(|lane| normals[lane].y)),
+        f32x8::load_array(simd, each_lane(|lane| normals[lane].z)),
     ]
 }

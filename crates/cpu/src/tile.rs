@@ -189,14 +189,16 @@ impl TileCapture {
         }
         let mut coverage = Coverage::default();
         for chunk in frame.chunks {
-            let (fragments, samples) = chunk.opaque.small.tile(number);
+            let mut small = chunk.opaque.small.tile(number);
             let records = chunk.opaque.records.tile(number);
-            self.has_opaque |= !fragments.is_empty() || !records.is_empty();
-            for (fragment, &sample) in fragments.iter().zip(samples) {
-                let Some(sample) = band.sample(sample) else { continue };
-                let key = order_key(fragment.depth, fragment.primitive);
-                if key >= self.opaque_keys[sample] {
-                    self.put_opaque(sample, key, fragment.light, fragment.draw + 1);
+            self.has_opaque |= !small.is_empty() || !records.is_empty();
+            while let Some((fragments, samples)) = small.next_before(None) {
+                for (fragment, &sample) in fragments.iter().zip(samples) {
+                    let Some(sample) = band.sample(sample) else { continue };
+                    let key = order_key(fragment.depth, fragment.primitive);
+                    if key >= self.opaque_keys[sample] {
+                        self.put_opaque(sample, key, fragment.light, fragment.draw + 1);
+                    }
                 }
             }
             for &record in records {
@@ -209,16 +211,18 @@ impl TileCapture {
             }
         }
         for chunk in frame.chunks {
-            let (mut small, mut samples) = chunk.transparent.small.tile(number);
+            let mut small = chunk.transparent.small.tile(number);
             for &record in chunk.transparent.records.tile(number) {
                 let record = chunk.record(record);
                 let primitive = frame.draws[record.draw as usize].first_primitive + record.triangle;
-                let before = small.iter().take_while(|fragment| fragment.primitive < primitive).count();
-                self.add_small(&small[..before], &samples[..before], band, frame);
-                (small, samples) = (&small[before..], &samples[before..]);
+                while let Some((fragments, samples)) = small.next_before(Some(primitive)) {
+                    self.add_small(fragments, samples, band, frame);
+                }
                 self.add_transparent(simd, chunk, record, frame, &mut coverage);
             }
-            self.add_small(small, samples, band, frame);
+            while let Some((fragments, samples)) = small.next_before(None) {
+                self.add_small(fragments, samples, band, frame);
+            }
         }
         self.shade_before(None, frame);
     }

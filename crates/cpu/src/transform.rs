@@ -1,48 +1,80 @@
-//! Vertices to the pixel grid, sixteen at a time.
+//! Vertices of a meshlet to the pixel grid, eight at a time.
 
-use std::ops::Range;
-
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdMask, dispatch, f32x16, i32x16};
+use bytemuck::Zeroable;
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, i32x8};
 use glam::{Mat4, Vec3};
+use pellucid_core::meshlets::{Eight, LANES, Meshlet};
 use pellucid_core::pixel_grid::{GUARD_BAND_PX, SUBPIXELS, ScreenVertex, Viewport};
 use pellucid_core::primitive::{Draw, transform_point};
-use rayon::prelude::*;
+
+use crate::simd::rows;
 
 /// Stands in for x of a vertex that cannot be projected; its y then holds the outcode.
 pub(crate) const OUTSIDE: i32 = i32::MIN;
 
-/// Vertices one thread transforms at a time.
-const CHUNK_VERTICES: usize = 4096;
+/// As many as two bytes tell apart.
+pub(crate) const VERTICES: usize = 1 << 16;
 
-const LANES: usize = 16;
-
-/// The vertices of a group of draws. Positions decide what is in sight, and most triangles of a fine mesh are not; so
-/// what only the others need stands apart.
-#[derive(Debug, Default)]
+/// The vertices of a meshlet. Two bytes name one, so that no place has to be checked.
+#[derive(Debug)]
 pub(crate) struct Vertices {
-    /// x and y in subpixels.
-    positions: Vec<[i32; 2]>,
-    /// Depth and 1 / w.
-    depths: Vec<[f32; 2]>,
-    /// Where each draw's vertices begin.
-    starts: Vec<usize>,
-}
-
-/// The vertices of a draw.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct DrawVertices<'a> {
     /// x and y in subpixels, or [`OUTSIDE`] and an outcode.
-    pub(crate) positions: &'a [[i32; 2]],
-    /// Depth and 1 / w.
-    pub(crate) depths: &'a [[f32; 2]],
+    pub(crate) positions: Box<[[i32; 2]; VERTICES]>,
+    depths: Box<[f32; VERTICES]>,
+    inv_ws: Box<[f32; VERTICES]>,
+    /// Depth, and normal in camera space over w if there are normals.
+    pub(crate) lit: Box<[[f32; 4]; VERTICES]>,
 }
 
-impl DrawVertices<'_> {
+impl Default for Vertices {
+    fn default() -> Self {
+        Self { positions: zeros(), depths: zeros(), inv_ws: zeros(), lit: zeros() }
+    }
+}
+
+fn zeros<T: Zeroable>() -> Box<[T; VERTICES]> {
+    bytemuck::allocation::zeroed_box()
+}
+
+impl Vertices {
     #[inline(always)]
-    pub(crate) fn vertex(&self, number: u32) -> ScreenVertex {
-        let [x, y] = self.positions[number as usize];
-        let [depth, inv_w] = self.depths[number as usize];
-        ScreenVertex { x, y, depth, inv_w }
+    pub(crate) fn vertex(&self, number: u16) -> ScreenVertex {
+        let number = usize::from(number);
+        let [x, y] = self.positions[number];
+        ScreenVertex { x, y, depth: self.depths[number], inv_w: self.inv_ws[number] }
+    }
+
+    /// Transforms the positions of a meshlet's vertices.
+    #[inline(always)]
+    pub(crate) fn transform<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, viewport: &Viewport, meshlet: &Meshlet<'_>) {
+        let screen = self.positions.as_chunks_mut::<LANES>().0.iter_mut();
+        let depths = self.depths.as_chunks_mut::<LANES>().0.iter_mut();
+        let inv_ws = self.inv_ws.as_chunks_mut::<LANES>().0.iter_mut();
+        for (((points, screen), depths), inv_ws) in meshlet.positions.iter().zip(screen).zip(depths).zip(inv_ws) {
+            if !transform_eight(simd, draw, viewport, points, screen, depths, inv_ws) {
+                transform_each(draw, viewport, points, screen, depths, inv_ws);
+            }
+        }
+    }
+
+    /// Makes ready what small triangles take beside the positions, which are transformed already.
+    #[inline(always)]
+    pub(crate) fn light<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, meshlet: &Meshlet<'_>) {
+        if !draw.lit || meshlet.normals.is_empty() {
+            let count = meshlet.positions.len() * LANES;
+            for (lit, depth) in self.lit.iter_mut().zip(&self.depths[..count]) {
+                lit[0] = *depth;
+            }
+            return;
+        }
+        let lit = self.lit.as_chunks_mut::<LANES>().0.iter_mut();
+        let depths = self.depths.as_chunks::<LANES>().0;
+        let inv_ws = self.inv_ws.as_chunks::<LANES>().0;
+        for (((normals, lit), depths), inv_ws) in meshlet.normals.iter().zip(lit).zip(depths).zip(inv_ws) {
+            let [x, y, z] = in_view(draw, axes(simd, normals));
+            let (depth, inv_w) = (f32x8::load_array_ref(simd, depths), f32x8::load_array_ref(simd, inv_ws));
+            rows(simd, [depth, x * inv_w, y * inv_w, z * inv_w], lit);
+        }
     }
 }
 
@@ -52,112 +84,35 @@ pub(crate) fn outcode([x, y]: [i32; 2]) -> u8 {
     if x == OUTSIDE { y as u8 } else { 0 }
 }
 
-/// Consecutive draws whose vertices are held at the same time.
-#[derive(Debug, Clone)]
-pub(crate) struct Group {
-    pub(crate) draws: Range<usize>,
-}
-
-/// Vertices a group holds at most, unless one mesh alone has more: 64 MiB of them.
-const GROUP_VERTICES: usize = 4 << 20;
-
-/// Splits draws into groups, so that memory does not grow with the number of instances.
-pub(crate) fn groups(draws: &[Draw<'_>]) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
-    let mut vertices = 0;
-    for (i, draw) in draws.iter().enumerate() {
-        let more = draw.mesh.positions().len();
-        match groups.last_mut() {
-            Some(group) if vertices + more <= GROUP_VERTICES => group.draws.end = i + 1,
-            _ => {
-                groups.push(Group { draws: i..i + 1 });
-                vertices = 0;
-            }
-        }
-        vertices += more;
-    }
-    groups
-}
-
-impl Vertices {
-    /// Transforms all vertices of a group's draws.
-    pub(crate) fn transform(&mut self, draws: &[Draw<'_>], viewport: &Viewport, level: Level) {
-        self.starts.clear();
-        let mut total = 0;
-        for draw in draws {
-            self.starts.push(total);
-            total += draw.mesh.positions().len();
-        }
-        self.positions.resize(total, [0; 2]);
-        self.depths.resize(total, [0.0; 2]);
-        let starts = &*self.starts;
-        let chunks = self.positions.par_chunks_mut(CHUNK_VERTICES).zip(self.depths.par_chunks_mut(CHUNK_VERTICES));
-        chunks.enumerate().for_each(|(chunk, (mut positions, mut depths))| {
-            let mut first = chunk * CHUNK_VERTICES;
-            let mut draw = starts.partition_point(|&start| start <= first) - 1;
-            while !positions.is_empty() {
-                let points = &draws[draw].mesh.positions()[first - starts[draw]..];
-                let count = points.len().min(positions.len());
-                let (these_positions, other_positions) = positions.split_at_mut(count);
-                let (these_depths, other_depths) = depths.split_at_mut(count);
-                let points = &points[..count];
-                dispatch!(level, simd => transform_mesh(simd, &draws[draw], viewport, points, these_positions, these_depths));
-                (positions, depths) = (other_positions, other_depths);
-                first += count;
-                draw += 1;
-            }
-        });
-    }
-
-    /// The vertices of the group's draw of this number, counted from the group's first.
-    pub(crate) fn draw(&self, number: usize) -> DrawVertices<'_> {
-        let first = self.starts[number];
-        DrawVertices { positions: &self.positions[first..], depths: &self.depths[first..] }
-    }
-
-    /// Bytes held.
-    pub(crate) fn bytes(&self) -> usize {
-        self.positions.capacity() * size_of::<[i32; 2]>() + self.depths.capacity() * size_of::<[f32; 2]>()
-    }
-}
-
+/// Normals in camera space.
 #[inline(always)]
-fn transform_mesh<S: Simd>(
-    simd: S,
-    draw: &Draw<'_>,
-    viewport: &Viewport,
-    points: &[Vec3],
-    positions: &mut [[i32; 2]],
-    depths: &mut [[f32; 2]],
-) {
-    let (points, last_points) = points.as_chunks::<LANES>();
-    let (positions, last_positions) = positions.as_chunks_mut::<LANES>();
-    let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
-    for ((points, positions), depths) in points.iter().zip(positions).zip(depths) {
-        if !transform_lanes(simd, draw, viewport, points, positions, depths) {
-            transform_each(draw, viewport, points, positions, depths);
-        }
-    }
-    transform_each(draw, viewport, last_points, last_positions, last_depths);
+pub(crate) fn in_view<S: Simd>(draw: &Draw<'_>, [x, y, z]: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
+    let matrix = &draw.view_from_normal;
+    [
+        (x * matrix.x_axis.x + y * matrix.y_axis.x) + z * matrix.z_axis.x,
+        (x * matrix.x_axis.y + y * matrix.y_axis.y) + z * matrix.z_axis.y,
+        (x * matrix.x_axis.z + y * matrix.y_axis.z) + z * matrix.z_axis.z,
+    ]
 }
 
-/// Vertex by vertex: the last ones of a mesh, and where some cannot be projected.
-#[inline(always)]
+/// Vertex by vertex, where some cannot be projected.
+#[cold]
 fn transform_each(
     draw: &Draw<'_>,
     viewport: &Viewport,
-    points: &[Vec3],
-    positions: &mut [[i32; 2]],
-    depths: &mut [[f32; 2]],
+    [x, y, z]: &Eight,
+    positions: &mut [[i32; 2]; LANES],
+    depths: &mut [f32; LANES],
+    inv_ws: &mut [f32; LANES],
 ) {
-    for ((&point, position), depth) in points.iter().zip(positions).zip(depths) {
-        let clip = transform_point(&draw.clip_from_mesh, point);
+    for lane in 0..LANES {
+        let clip = transform_point(&draw.clip_from_mesh, Vec3::new(x[lane], y[lane], z[lane]));
         let outcode = viewport.outcode(clip);
-        (*position, *depth) = if outcode == 0 {
+        (positions[lane], depths[lane], inv_ws[lane]) = if outcode == 0 {
             let vertex = viewport.project(clip);
-            ([vertex.x, vertex.y], [vertex.depth, vertex.inv_w])
+            ([vertex.x, vertex.y], vertex.depth, vertex.inv_w)
         } else {
-            ([OUTSIDE, i32::from(outcode)], [0.0; 2])
+            ([OUTSIDE, i32::from(outcode)], 0.0, 0.0)
         };
     }
 }
@@ -165,19 +120,16 @@ fn transform_each(
 /// The same operations as in [`transform_point`], [`Viewport::outcode`] and [`Viewport::project`]; `false`, with nothing
 /// done, unless all can be projected.
 #[inline(always)]
-fn transform_lanes<S: Simd>(
+fn transform_eight<S: Simd>(
     simd: S,
     draw: &Draw<'_>,
     viewport: &Viewport,
-    points: &[Vec3; LANES],
+    points: &Eight,
     positions: &mut [[i32; 2]; LANES],
-    depths: &mut [[f32; 2]; LANES],
+    depths: &mut [f32; LANES],
+    inv_ws: &mut [f32; LANES],
 ) -> bool {
-    let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for (lane, point) in points.iter().enumerate() {
-        [x[lane], y[lane], z[lane]] = point.to_array();
-    }
-    let point = [f32x16::load_array(simd, x), f32x16::load_array(simd, y), f32x16::load_array(simd, z)];
+    let point = axes(simd, points);
     let matrix = &draw.clip_from_mesh;
     let (clip_x, clip_y, clip_z, clip_w) = (
         matrix_row(matrix, 0, point),
@@ -197,32 +149,33 @@ fn transform_lanes<S: Simd>(
     if outside.any_true() {
         return false;
     }
-    let inv_w = f32x16::splat(simd, 1.0) / clip_w;
+    let inv_w = f32x8::splat(simd, 1.0) / clip_w;
     let [half_x, half_y] = viewport.half();
     let screen_x = snap(clip_x * inv_w, half_x) + half_x;
-    let screen_y = i32x16::splat(simd, half_y) - snap(clip_y * inv_w, half_y);
+    let screen_y = i32x8::splat(simd, half_y) - snap(clip_y * inv_w, half_y);
     let depth = ((clip_z * inv_w).max_precise(0.0) + 0.0).min_precise(1.0);
-    store_pairs(screen_x, screen_y, positions.as_flattened_mut());
-    store_pairs(depth, inv_w, depths.as_flattened_mut());
+    let (low, high) = screen_x.interleave(screen_y);
+    let (first, second) = positions.as_flattened_mut().split_at_mut(LANES);
+    low.store_slice(first);
+    high.store_slice(second);
+    depth.store_slice(depths);
+    inv_w.store_slice(inv_ws);
     true
 }
 
 #[inline(always)]
-fn matrix_row<S: Simd>(matrix: &Mat4, row: usize, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
+fn axes<S: Simd>(simd: S, [x, y, z]: &Eight) -> [f32x8<S>; 3] {
+    [f32x8::load_array_ref(simd, x), f32x8::load_array_ref(simd, y), f32x8::load_array_ref(simd, z)]
+}
+
+#[inline(always)]
+fn matrix_row<S: Simd>(matrix: &Mat4, row: usize, [x, y, z]: [f32x8<S>; 3]) -> f32x8<S> {
     ((x * matrix.x_axis[row] + y * matrix.y_axis[row]) + z * matrix.z_axis[row]) + matrix.w_axis[row]
 }
 
 /// From -1..=1 to subpixels.
 #[inline(always)]
-fn snap<S: Simd>(ndc: f32x16<S>, half: i32) -> i32x16<S> {
+fn snap<S: Simd>(ndc: f32x8<S>, half: i32) -> i32x8<S> {
     let guard = (GUARD_BAND_PX * SUBPIXELS) as f32;
     (ndc * half as f32).max_precise(-guard).min_precise(guard).round_ties_even().to_int()
-}
-
-#[inline(always)]
-fn store_pairs<S: Simd, V: SimdBase<S>>(first: V, second: V, pairs: &mut [V::Element]) {
-    let (low, high) = first.interleave(second);
-    let (low_pairs, high_pairs) = pairs.split_at_mut(LANES);
-    low.store_slice(low_pairs);
-    high.store_slice(high_pairs);
 }
