@@ -1,9 +1,10 @@
 //! The transparent fragments of a tile, as structure of arrays.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8, mask32x8, u32x8};
+use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdMask, SimdWiden, dispatch};
+use fearless_simd::{f32x8, mask32x8, u16x8, u32x8};
 
 use crate::shade::SHADED_LANES;
-use crate::small_fragments::SmallFragment;
+use crate::small_fragments::RunFragments;
 use crate::tile::Band;
 
 /// Where the colour of a fragment comes from: 0 for none, the number of a draw plus 1, in whose palette colour it is lit,
@@ -188,52 +189,38 @@ impl Fragments {
     }
 
     #[inline(always)]
-    pub(crate) fn extend(&mut self, small: &[SmallFragment], samples: &[u16]) {
-        if small.is_empty() {
-            return;
-        }
-        let room = self.room(small.len());
-        for (to, from) in room.samples.iter_mut().zip(samples) {
+    pub(crate) fn extend(&mut self, run: RunFragments<'_>) {
+        let count = run.samples.len();
+        let room = self.room(count);
+        for (to, from) in room.samples.iter_mut().zip(run.samples) {
             *to = u32::from(*from);
         }
-        for ((((depth, light), source), primitive), from) in
-            room.depths.iter_mut().zip(room.lights).zip(room.sources).zip(room.primitives).zip(small)
-        {
-            (*depth, *light, *source, *primitive) = (from.depth, from.light, from.draw + 1, from.primitive);
-        }
-        self.end += small.len();
+        room.depths.copy_from_slice(run.depths);
+        room.lights.copy_from_slice(run.lights);
+        room.sources.fill(run.draw + 1);
+        room.primitives.copy_from_slice(run.primitives);
+        self.end += count;
     }
 
     /// Adds those of small triangles' fragments that lie in a band and not behind the depths in `hidden`.
     #[inline(never)]
-    pub(crate) fn extend_within(
-        &mut self,
-        level: Level,
-        small: &[SmallFragment],
-        samples: &[u16],
-        band: Band,
-        hidden: Option<&[f32]>,
-    ) {
-        dispatch!(level, simd => self.extend_within_simd(simd, small, samples, band, hidden));
+    pub(crate) fn extend_within(&mut self, level: Level, run: RunFragments<'_>, band: Band, hidden: Option<&[f32]>) {
+        dispatch!(level, simd => self.extend_within_simd(simd, run, band, hidden));
     }
 
     #[inline(always)]
-    fn extend_within_simd<S: Simd>(
-        &mut self,
-        simd: S,
-        small: &[SmallFragment],
-        samples: &[u16],
-        band: Band,
-        hidden: Option<&[f32]>,
-    ) {
-        let (vectors, rest) = small.as_chunks::<SHADED_LANES>();
-        let (vectors_of_samples, rest_of_samples) = samples.as_chunks::<SHADED_LANES>();
-        for (small, samples) in vectors.iter().zip(vectors_of_samples) {
-            let samples = u32x8::load_array(simd, samples.map(u32::from)) - band.first;
-            let depths = f32x8::load_array(simd, std::array::from_fn(|i| small[i].depth));
+    fn extend_within_simd<S: Simd>(&mut self, simd: S, run: RunFragments<'_>, band: Band, hidden: Option<&[f32]>) {
+        const LANES: usize = SHADED_LANES;
+        let sources = u32x8::splat(simd, run.draw + 1);
+        let whole = run.samples.len() / LANES * LANES;
+        for first in (0..whole).step_by(LANES) {
+            let these = first..first + LANES;
+            let (low, high) = u16x8::from_slice(simd, &run.samples[these.clone()]).widen();
+            let samples = low.combine(high) - band.first;
+            let depths = f32x8::from_slice(simd, &run.depths[these.clone()]);
             let mut kept = samples.simd_lt(band.count);
             if let Some(hidden) = hidden {
-                let samples: [u32; SHADED_LANES] = samples.into();
+                let samples: [u32; LANES] = samples.into();
                 let hidden = samples.map(|sample| hidden.get(sample as usize).copied().unwrap_or_default());
                 kept &= depths.simd_ge(f32x8::load_array(simd, hidden));
             }
@@ -241,21 +228,18 @@ impl Fragments {
             if bits == 0 {
                 continue;
             }
-            let room = self.room(SHADED_LANES);
+            let room = self.room(LANES);
             samples.compress(kept).store_slice(room.samples);
             depths.compress(kept).store_slice(room.depths);
-            let lights = f32x8::load_array(simd, std::array::from_fn(|i| small[i].light));
-            lights.compress(kept).store_slice(room.lights);
-            let sources = u32x8::load_array(simd, std::array::from_fn(|i| small[i].draw + 1));
-            sources.compress(kept).store_slice(room.sources);
-            let primitives = u32x8::load_array(simd, std::array::from_fn(|i| small[i].primitive));
-            primitives.compress(kept).store_slice(room.primitives);
+            f32x8::from_slice(simd, &run.lights[these.clone()]).compress(kept).store_slice(room.lights);
+            sources.store_slice(room.sources);
+            u32x8::from_slice(simd, &run.primitives[these]).compress(kept).store_slice(room.primitives);
             self.advance(bits.count_ones() as usize);
         }
-        for (fragment, &sample) in rest.iter().zip(rest_of_samples) {
-            let Some(sample) = band.sample(sample) else { continue };
-            if hidden.is_none_or(|hidden| fragment.depth >= hidden[sample]) {
-                self.push(sample as u32, fragment.depth, fragment.light, fragment.draw + 1, fragment.primitive);
+        for i in whole..run.samples.len() {
+            let Some(sample) = band.sample(run.samples[i]) else { continue };
+            if hidden.is_none_or(|hidden| run.depths[i] >= hidden[sample]) {
+                self.push(sample as u32, run.depths[i], run.lights[i], run.draw + 1, run.primitives[i]);
             }
         }
     }

@@ -12,9 +12,9 @@ use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
 use crate::bin::TILE_PX;
-use crate::simd::{Lookup, columns, each_lane, light, narrow, rows, unzip, wide, widen, words};
+use crate::simd::{Lookup, columns, each_lane, light, narrow, unzip, wide, widen, words};
 use crate::small_blocks::{BLOCK_BITS, BLOCK_PX, COLUMN_BITS, SmallBlock, SmallBlocks};
-use crate::small_fragments::{SmallFragment, SmallFragments};
+use crate::small_fragments::{NewFragments, SmallFragments};
 use crate::transform::{Vertices, in_view};
 
 /// Most fragments of a small triangle. One that has more is a record: it takes less room, and a tile makes fragments side
@@ -34,8 +34,8 @@ pub(crate) fn make_fragments(
     vertices: &Vertices,
     fragments: &mut SmallFragments,
 ) {
-    blocks.sort_by_tile(&mut fragments.runs);
-    dispatch!(level, simd => make_simd(simd, blocks, draw, draw_number, meshlet, vertices, fragments));
+    blocks.sort_by_tile(draw_number, &mut fragments.runs);
+    dispatch!(level, simd => make_simd(simd, blocks, draw, meshlet, vertices, fragments));
     blocks.clear();
 }
 
@@ -44,7 +44,6 @@ fn make_simd<S: Simd>(
     simd: S,
     blocks: &mut SmallBlocks,
     draw: &Draw<'_>,
-    draw_number: u32,
     meshlet: &Meshlet<'_>,
     vertices: &Vertices,
     fragments: &mut SmallFragments,
@@ -55,11 +54,13 @@ fn make_simd<S: Simd>(
         let triangles = Triangles::new(simd, blocks, draw, meshlet, vertices);
         samples.put_down(&blocks[..left.min(LANES)]);
         left = left.saturating_sub(LANES);
-        let (new_samples, new_fragments) = fragments.add(samples.count, LANES);
+        let NewFragments { samples: new_samples, depths, lights, primitives } = fragments.add(samples.count, LANES);
         let numbers = samples.numbers[..samples.count.next_multiple_of(LANES)].as_chunks().0;
-        let room = new_samples.as_chunks_mut().0.iter_mut().zip(new_fragments.as_chunks_mut().0);
-        for (numbers, (new_samples, new_fragments)) in numbers.iter().zip(room) {
-            triangles.make_fragments(simd, numbers, draw_number, new_samples, new_fragments);
+        let (new_samples, depths) = (new_samples.as_chunks_mut().0, depths.as_chunks_mut().0);
+        let (lights, primitives) = (lights.as_chunks_mut().0, primitives.as_chunks_mut().0);
+        let room = new_samples.iter_mut().zip(depths).zip(lights).zip(primitives);
+        for (numbers, (((samples, depths), lights), primitives)) in numbers.iter().zip(room) {
+            triangles.make_fragments(simd, numbers, samples, depths, lights, primitives);
         }
     }
 }
@@ -149,9 +150,10 @@ impl<S: Simd> Triangles<S> {
         &self,
         simd: S,
         numbers: &[u16; LANES],
-        draw_number: u32,
         samples: &mut [u16; LANES],
-        fragments: &mut [SmallFragment; LANES],
+        depths: &mut [f32; LANES],
+        lights: &mut [f32; LANES],
+        primitives: &mut [u32; LANES],
     ) {
         let (low, high) = u16x8::load_array_ref(simd, numbers).widen();
         let numbers: u32x8<S> = low.combine(high);
@@ -176,9 +178,9 @@ impl<S: Simd> Triangles<S> {
                 light(simd, [looked_up(&lookup, nx, x, y), looked_up(&lookup, ny, x, y), looked_up(&lookup, nz, x, y)])
             }
         };
-        let draw = f32x8::splat(simd, f32::from_bits(draw_number));
-        let fields = [depth, light, lookup.words(self.primitive).bitcast(), draw];
-        rows(simd, fields, bytemuck::cast_slice_mut(fragments));
+        depth.store_slice(depths);
+        light.store_slice(lights);
+        lookup.words(self.primitive).store_slice(primitives);
     }
 }
 

@@ -46,7 +46,8 @@ pub(crate) struct SmallBlocks {
 /// A tile that blocks of the meshlet lie in.
 #[derive(Debug, Clone, Copy)]
 struct TileBlocks {
-    run: Run,
+    tile: u32,
+    fragments: u32,
     /// How many blocks, then where the next one goes.
     blocks: u32,
 }
@@ -91,7 +92,7 @@ impl SmallBlocks {
         let tile = place_of_tile - 1;
         let in_tile = &mut self.tiles[usize::from(tile)];
         in_tile.blocks += 1;
-        in_tile.run.count += covered.count_ones();
+        in_tile.fragments += covered.count_ones();
         self.blocks.push(SmallBlock { covered, place, triangle, tile, corners });
     }
 
@@ -125,7 +126,7 @@ impl SmallBlocks {
 
     #[inline(never)]
     fn add_tile(&mut self, tile: u32) -> u16 {
-        self.tiles.push(TileBlocks { run: Run { tile, count: 0 }, blocks: 0 });
+        self.tiles.push(TileBlocks { tile, fragments: 0, blocks: 0 });
         let place = self.tiles.len() as u16;
         self.places_of_tiles[tile as usize] = place;
         place
@@ -138,15 +139,15 @@ impl SmallBlocks {
     pub(crate) fn clear(&mut self) {
         self.blocks.clear();
         for tile in self.tiles.drain(..) {
-            self.places_of_tiles[tile.run.tile as usize] = 0;
+            self.places_of_tiles[tile.tile as usize] = 0;
         }
     }
 
-    /// Sorts them by tile, keeping draw order, and tells how many fragments each tile gets.
-    pub(crate) fn sort_by_tile(&mut self, runs: &mut Vec<Run>) {
+    /// Sorts those of a draw by tile, keeping draw order, and tells how many fragments each tile gets.
+    pub(crate) fn sort_by_tile(&mut self, draw: u32, runs: &mut Vec<Run>) {
         let mut sum = 0;
         for tile in &mut self.tiles {
-            runs.push(tile.run);
+            runs.push(Run { tile: tile.tile, count: tile.fragments, draw });
             sum += std::mem::replace(&mut tile.blocks, sum);
         }
         let room = self.blocks.len().next_multiple_of(LANES);

@@ -15,7 +15,7 @@ use crate::order::Order;
 use crate::raster::{Coverage, Depths, FoldState, RowFragments, cover};
 use crate::setup::{Chunk, Record};
 use crate::shade::{Unshaded, VaryingSurface};
-use crate::small_fragments::SmallFragment;
+use crate::small_fragments::RunFragments;
 use crate::surfaces::Surfaces;
 
 /// Samples of a tile.
@@ -192,12 +192,12 @@ impl TileCapture {
             let mut small = chunk.opaque.small.tile(number);
             let records = chunk.opaque.records.tile(number);
             self.has_opaque |= !small.is_empty() || !records.is_empty();
-            while let Some((fragments, samples)) = small.next_before(None) {
-                for (fragment, &sample) in fragments.iter().zip(samples) {
+            while let Some(run) = small.next_before(None) {
+                for (i, &sample) in run.samples.iter().enumerate() {
                     let Some(sample) = band.sample(sample) else { continue };
-                    let key = order_key(fragment.depth, fragment.primitive);
+                    let key = order_key(run.depths[i], run.primitives[i]);
                     if key >= self.opaque_keys[sample] {
-                        self.put_opaque(sample, key, fragment.light, fragment.draw + 1);
+                        self.put_opaque(sample, key, run.lights[i], run.draw + 1);
                     }
                 }
             }
@@ -215,13 +215,13 @@ impl TileCapture {
             for &record in chunk.transparent.records.tile(number) {
                 let record = chunk.record(record);
                 let primitive = frame.draws[record.draw as usize].first_primitive + record.triangle;
-                while let Some((fragments, samples)) = small.next_before(Some(primitive)) {
-                    self.add_small(fragments, samples, band, frame);
+                while let Some(run) = small.next_before(Some(primitive)) {
+                    self.add_small(run, band, frame);
                 }
                 self.add_transparent(simd, chunk, record, frame, &mut coverage);
             }
-            while let Some((fragments, samples)) = small.next_before(None) {
-                self.add_small(fragments, samples, band, frame);
+            while let Some(run) = small.next_before(None) {
+                self.add_small(run, band, frame);
             }
         }
         self.shade_before(None, frame);
@@ -283,17 +283,14 @@ impl TileCapture {
 
     /// Adds fragments of small triangles that lie in a band, unless they lie behind an opaque surface.
     #[inline(always)]
-    fn add_small(&mut self, small: &[SmallFragment], samples: &[u16], band: Band, frame: FrameParts<'_>) {
-        if small.is_empty() {
-            return;
-        }
+    fn add_small(&mut self, run: RunFragments<'_>, band: Band, frame: FrameParts<'_>) {
         self.shade_before(None, frame);
         if !self.has_opaque && band.is_whole_tile() {
-            self.fragments.extend(small, samples);
+            self.fragments.extend(run);
             return;
         }
         let hidden = self.has_opaque.then_some(self.opaque_depths.as_slice());
-        self.fragments.extend_within(frame.level, small, samples, band, hidden);
+        self.fragments.extend_within(frame.level, run, band, hidden);
     }
 
     #[inline(always)]
