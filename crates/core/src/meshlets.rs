@@ -13,6 +13,7 @@ pub const LANES: usize = 8;
 /// Triangles of a meshlet at most: so many that few vertices are in several, and few enough for their vertices to stay in
 /// the second-level cache. Two bytes tell three vertices of each.
 pub const MESHLET_TRIANGLES: usize = 16_384;
+const _: () = assert!(3 * MESHLET_TRIANGLES <= 1 << u16::BITS);
 
 /// Meshlets of a mesh at least, unless they get smaller than [`FEWEST_TRIANGLES`]: threads share them out.
 const FEWEST_MESHLETS: usize = 16;
@@ -80,6 +81,9 @@ impl Meshlets {
             let corners: Vec<[u16; 3]> = triangles.iter().map(|triangle| triangle.map(&mut corner)).collect();
             meshlets.push(mesh, &vertices, &corners);
         }
+        meshlets.corners.shrink_to_fit();
+        meshlets.positions.shrink_to_fit();
+        meshlets.normals.shrink_to_fit();
         meshlets
     }
 

@@ -149,28 +149,7 @@ impl Bins {
 
     /// Sorts what was added by tile, keeping draw order.
     pub(crate) fn finish(&mut self, grid: &TileGrid) {
-        self.starts.clear();
-        self.records.clear();
-        if self.pairs.is_empty() {
-            return;
-        }
-        self.starts.resize(grid.tile_count() + 1, 0);
-        for &(tile, _) in &self.pairs {
-            self.starts[tile as usize + 1] += 1;
-        }
-        for i in 1..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.records.resize(self.pairs.len(), 0);
-        // Each start moves to the next one's place while its records are put down ...
-        for &(tile, record) in &self.pairs {
-            let place = &mut self.starts[tile as usize];
-            self.records[*place as usize] = record;
-            *place += 1;
-        }
-        // ... and back.
-        self.starts.copy_within(0..grid.tile_count(), 1);
-        self.starts[0] = 0;
+        sort_by_tile(self.pairs.iter().copied(), grid, &mut self.starts, &mut self.records);
     }
 
     /// The records of a tile, in draw order.
@@ -203,4 +182,36 @@ pub(crate) fn add_counts(starts: &[u32], weight: usize, counts: &mut [u64]) {
     for (count, range) in counts.iter_mut().zip(starts.windows(2)) {
         *count += u64::from(range[1] - range[0]) * weight as u64;
     }
+}
+
+/// Sorts what comes with a tile each by tile, keeping its order: that of tile `i` is `sorted[starts[i]..starts[i + 1]]`.
+/// Both are empty if nothing comes.
+pub(crate) fn sort_by_tile<T: Copy + Default>(
+    all: impl ExactSizeIterator<Item = (u32, T)> + Clone,
+    grid: &TileGrid,
+    starts: &mut Vec<u32>,
+    sorted: &mut Vec<T>,
+) {
+    starts.clear();
+    sorted.clear();
+    if all.len() == 0 {
+        return;
+    }
+    starts.resize(grid.tile_count() + 1, 0);
+    for (tile, _) in all.clone() {
+        starts[tile as usize + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    sorted.resize(all.len(), T::default());
+    // Each start moves to the next one's place while what belongs there is put down ...
+    for (tile, one) in all {
+        let place = &mut starts[tile as usize];
+        sorted[*place as usize] = one;
+        *place += 1;
+    }
+    // ... and back.
+    starts.copy_within(0..grid.tile_count(), 1);
+    starts[0] = 0;
 }

@@ -1,8 +1,8 @@
 //! The CPU renderer of Pellucid: exact transparency, tile by tile, on all cores, no GPU needed.
 //!
-//! A frame, by module: `renderer` runs it top to bottom; `transform` brings vertices to the pixel grid; `setup` looks what
-//! is in `sight`, turns `small` triangles into `small_fragments` and others into records, and hands both to tiles, records
-//! through `bin`; `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a
+//! A frame, by module: `renderer` runs it top to bottom; `setup` brings the vertices of a meshlet to the pixel grid
+//! (`transform`), looks what is in `sight`, turns `small_blocks` of triangles into `small_fragments` (`small`) and other triangles into records,
+//! and hands both to tiles, records through `bin`; `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a
 //! time, into a `canvas`.
 #![forbid(unsafe_code)]
 

@@ -89,7 +89,7 @@ pub(crate) struct SetupScratch {
 impl SetupScratch {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.blocks.bytes()
+        Vertices::BYTES + self.blocks.bytes()
     }
 }
 
@@ -102,7 +102,7 @@ pub(crate) struct Span {
     pub(crate) triangle_count: usize,
 }
 
-/// Bytes of the budget for each triangle of a chunk. One that is being filled takes some 100 a triangle beyond the budget,
+/// Bytes of the budget for each triangle of a chunk. One that is being filled takes some 50 a triangle beyond the budget,
 /// which should not be much of it.
 const BUDGET_FOR_A_TRIANGLE: usize = 512;
 

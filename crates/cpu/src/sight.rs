@@ -13,14 +13,14 @@ use crate::small::MOST_FRAGMENTS;
 use crate::small_blocks::{BLOCK_PX, COLUMN_BITS};
 use crate::transform::{OUTSIDE, VERTICES};
 
-/// A triangle less than so many subpixels wide and high is small: at most two blocks a side. Edge values then fit 32 bits
-/// with ease, and sides and area fit f32.
-const SMALL_SUBPIXELS: i32 = 2 * BLOCK_PX * SUBPIXELS;
+/// A triangle less than so many subpixels wide and high is small: at most four blocks a side. Edge values then fit 32 bits
+/// with ease.
+const SMALL_SUBPIXELS: i32 = 4 * BLOCK_PX * SUBPIXELS;
 
 const TILE_BITS: u32 = TILE_PX.ilog2();
 
 /// Blocks of samples that a small triangle may reach.
-const BLOCKS: usize = 4;
+const BLOCKS: usize = 16;
 
 /// What is known of eight triangles; a bit for each in a mask.
 #[derive(Default)]

@@ -3,11 +3,13 @@
 
 pub use fearless_simd::Level;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use fearless_simd::i32x4;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 use fearless_simd::{Avx2, SimdInto};
 use fearless_simd::{
     Bytes, Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdInt, SimdInterleaved, SimdNarrow, SimdSplit, SimdWiden,
 };
-use fearless_simd::{f32x4, f32x8, f64x4, f64x8, i32x4, i32x8, u32x8, u32x16};
+use fearless_simd::{f32x4, f32x8, f64x4, f64x8, i32x8, u32x8, u32x16};
 use pellucid_core::shading::AMBIENT;
 #[cfg(target_arch = "x86")]
 use std::arch::x86::{

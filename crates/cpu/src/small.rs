@@ -34,7 +34,7 @@ pub(crate) fn make_fragments(
     vertices: &Vertices,
     fragments: &mut SmallFragments,
 ) {
-    blocks.sort_by_tile(draw_number, &mut fragments.runs);
+    blocks.sort_by_tile(draw_number, fragments);
     dispatch!(level, simd => make_simd(simd, blocks, draw, meshlet, vertices, fragments));
     blocks.clear();
 }

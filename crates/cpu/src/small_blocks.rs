@@ -3,7 +3,7 @@
 use pellucid_core::meshlets::LANES;
 
 use crate::bin::{TILE_PX, TileGrid};
-use crate::small_fragments::Run;
+use crate::small_fragments::SmallFragments;
 
 /// Side of a block of samples.
 pub(crate) const BLOCK_PX: i32 = 8;
@@ -21,7 +21,7 @@ pub(crate) struct SmallBlock {
     /// Number of the triangle in the meshlet.
     pub(crate) triangle: u16,
     /// The place of its tile among those of the meshlet.
-    tile: u16,
+    tile: u32,
     /// Vertices of the meshlet.
     pub(crate) corners: [u16; 3],
 }
@@ -36,7 +36,7 @@ pub(crate) struct SmallBlocks {
     blocks: Vec<SmallBlock>,
     tiles: Vec<TileBlocks>,
     /// For each tile of the window its place among those of the meshlet plus 1, or 0.
-    places_of_tiles: Vec<u16>,
+    places_of_tiles: Vec<u32>,
     /// Tile by tile, each tile's in draw order; filled up to a multiple of eight with any of them.
     sorted: Vec<SmallBlock>,
     /// What eight of them cover.
@@ -90,7 +90,7 @@ impl SmallBlocks {
             place_of_tile = self.add_tile(tile);
         }
         let tile = place_of_tile - 1;
-        let in_tile = &mut self.tiles[usize::from(tile)];
+        let in_tile = &mut self.tiles[tile as usize];
         in_tile.blocks += 1;
         in_tile.fragments += covered.count_ones();
         self.blocks.push(SmallBlock { covered, place, triangle, tile, corners });
@@ -125,9 +125,9 @@ impl SmallBlocks {
     }
 
     #[inline(never)]
-    fn add_tile(&mut self, tile: u32) -> u16 {
+    fn add_tile(&mut self, tile: u32) -> u32 {
         self.tiles.push(TileBlocks { tile, fragments: 0, blocks: 0 });
-        let place = self.tiles.len() as u16;
+        let place = self.tiles.len() as u32;
         self.places_of_tiles[tile as usize] = place;
         place
     }
@@ -144,10 +144,10 @@ impl SmallBlocks {
     }
 
     /// Sorts those of a draw by tile, keeping draw order, and tells how many fragments each tile gets.
-    pub(crate) fn sort_by_tile(&mut self, draw: u32, runs: &mut Vec<Run>) {
+    pub(crate) fn sort_by_tile(&mut self, draw: u32, fragments: &mut SmallFragments) {
         let mut sum = 0;
         for tile in &mut self.tiles {
-            runs.push(Run { tile: tile.tile, count: tile.fragments, draw });
+            fragments.add_run(tile.tile, tile.fragments, draw);
             sum += std::mem::replace(&mut tile.blocks, sum);
         }
         let room = self.blocks.len().next_multiple_of(LANES);
@@ -155,7 +155,7 @@ impl SmallBlocks {
             self.sorted.resize(room, SmallBlock::default());
         }
         for block in &self.blocks {
-            let next = &mut self.tiles[usize::from(block.tile)].blocks;
+            let next = &mut self.tiles[block.tile as usize].blocks;
             self.sorted[*next as usize] = *block;
             *next += 1;
         }
@@ -178,7 +178,7 @@ impl SmallBlocks {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         (self.blocks.capacity() + self.sorted.capacity()) * size_of::<SmallBlock>()
-            + self.places_of_tiles.capacity() * 2
+            + self.places_of_tiles.capacity() * 4
             + self.tiles.capacity() * size_of::<TileBlocks>()
     }
 }

@@ -1,6 +1,6 @@
 //! Fragments of small triangles to tiles: as they come from the meshlets of a chunk, then sorted by tile.
 
-use crate::bin::TileGrid;
+use crate::bin::{TileGrid, sort_by_tile};
 
 /// Fragments of a chunk's small triangles, as structure of arrays.
 #[derive(Debug, Default)]
@@ -14,27 +14,21 @@ pub(crate) struct SmallFragments {
     /// How many there are; beyond is room.
     count: usize,
     /// All of them, one run after the other.
-    pub(crate) runs: Vec<Run>,
+    runs: Vec<Run>,
     /// The runs of tile `i` are `by_tile[starts[i]..starts[i + 1]]`, in draw order.
     starts: Vec<u32>,
-    by_tile: Vec<TileRun>,
+    by_tile: Vec<Run>,
 }
 
 /// Fragments in one tile that were made one after the other, all of one draw.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Run {
     pub(crate) tile: u32,
+    /// Number of the first among those of the chunk.
+    pub(crate) first: u32,
     pub(crate) count: u32,
     /// Number of the draw.
     pub(crate) draw: u32,
-}
-
-/// Such fragments among all those of the chunk.
-#[derive(Debug, Clone, Copy, Default)]
-struct TileRun {
-    first: u32,
-    count: u32,
-    draw: u32,
 }
 
 /// Some fragments of a draw.
@@ -65,6 +59,12 @@ impl SmallFragments {
         self.runs.clear();
     }
 
+    /// Tells of fragments to be added: of a draw's, how many in a tile.
+    pub(crate) fn add_run(&mut self, tile: u32, count: u32, draw: u32) {
+        let first = self.runs.last().map_or(0, |run| run.first + run.count);
+        self.runs.push(Run { tile, first, count, draw });
+    }
+
     /// Adds so many, to be written, and room for `beyond` more that may be.
     #[inline(always)]
     pub(crate) fn add(&mut self, count: usize, beyond: usize) -> NewFragments<'_> {
@@ -85,43 +85,22 @@ impl SmallFragments {
     #[cold]
     fn grow(&mut self, end: usize) {
         let room = (end + end / 4).max(1024);
-        self.samples.resize(room, 0);
-        self.depths.resize(room, 0.0);
-        self.lights.resize(room, 0.0);
-        self.primitives.resize(room, 0);
+        resize(&mut self.samples, room);
+        resize(&mut self.depths, room);
+        resize(&mut self.lights, room);
+        resize(&mut self.primitives, room);
     }
 
     /// Sorts runs by tile, keeping draw order.
     pub(crate) fn finish(&mut self, grid: &TileGrid) {
-        self.starts.clear();
-        if self.runs.is_empty() {
-            return;
-        }
-        self.starts.resize(grid.tile_count() + 1, 0);
-        for run in &self.runs {
-            self.starts[run.tile as usize + 1] += 1;
-        }
-        for i in 1..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.by_tile.resize(self.runs.len(), TileRun::default());
-        let mut first = 0;
-        // Each start moves to the next one's place while its runs are put down ...
-        for run in &self.runs {
-            let place = &mut self.starts[run.tile as usize];
-            self.by_tile[*place as usize] = TileRun { first, count: run.count, draw: run.draw };
-            *place += 1;
-            first += run.count;
-        }
-        // ... and back.
-        self.starts.copy_within(0..grid.tile_count(), 1);
-        self.starts[0] = 0;
+        let runs = self.runs.iter().map(|&run| (run.tile, run));
+        sort_by_tile(runs, grid, &mut self.starts, &mut self.by_tile);
     }
 
     /// The fragments in a tile.
     #[inline(always)]
     pub(crate) fn tile(&self, number: u32) -> TileRuns<'_> {
-        let mut runs: &[TileRun] = &[];
+        let mut runs: &[Run] = &[];
         if !self.starts.is_empty() {
             let number = number as usize;
             runs = &self.by_tile[self.starts[number] as usize..self.starts[number + 1] as usize];
@@ -139,7 +118,8 @@ impl SmallFragments {
     /// Adds how many bytes each tile needs.
     pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
         for run in &self.runs {
-            bytes[run.tile as usize] += u64::from(run.count) * FRAGMENT_BYTES as u64;
+            let run_bytes = size_of::<Run>() + size_of::<Run>();
+            bytes[run.tile as usize] += (run.count as usize * FRAGMENT_BYTES + run_bytes) as u64;
         }
     }
 
@@ -148,15 +128,21 @@ impl SmallFragments {
         self.samples.capacity() * FRAGMENT_BYTES
             + self.runs.capacity() * size_of::<Run>()
             + self.starts.capacity() * 4
-            + self.by_tile.capacity() * size_of::<TileRun>()
+            + self.by_tile.capacity() * size_of::<Run>()
     }
+}
+
+/// To exactly so many: what vectors usually grow by is more than the budget knows of.
+fn resize<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+    values.reserve_exact(count - values.len());
+    values.resize(count, T::default());
 }
 
 /// The runs of fragments in a tile, in draw order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileRuns<'a> {
     all: &'a SmallFragments,
-    runs: &'a [TileRun],
+    runs: &'a [Run],
     /// How many of the first run's fragments were taken.
     begun: u32,
 }

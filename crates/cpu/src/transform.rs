@@ -37,6 +37,8 @@ fn zeros<T: Zeroable>() -> Box<[T; VERTICES]> {
 }
 
 impl Vertices {
+    pub(crate) const BYTES: usize = VERTICES * (size_of::<[i32; 2]>() + 2 * size_of::<f32>() + size_of::<[f32; 4]>());
+
     #[inline(always)]
     pub(crate) fn vertex(&self, number: u16) -> ScreenVertex {
         let number = usize::from(number);

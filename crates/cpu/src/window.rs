@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
 
-/// Bytes that chunks hold at most, unless a single tile needs more: together with vertices, tiles and a picture of
+/// Bytes that chunks hold at most, unless a single tile needs more: together with what threads take, tiles and a picture of
 /// 1920 x 1080 less than 2 GiB.
 pub(crate) const DEFAULT_BUDGET_BYTES: usize = 3 << 29;
 

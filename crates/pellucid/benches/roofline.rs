@@ -12,7 +12,7 @@ use std::time::Instant;
 use common::{SCENES, case};
 use fearless_simd::{Level, Simd, SimdBase, SimdNarrow, SimdSplit, dispatch, f32x8, f64x8, u32x8};
 use glam::Vec4;
-use pellucid::{Resolve, Scene, Stats, View};
+use pellucid::{Mesh, Resolve, Scene, Stats, View};
 use pellucid_cpu::{Canvas, CpuRenderer, simd};
 
 /// What a machine can do at best, on all its cores together.
@@ -116,13 +116,14 @@ impl Peaks {
     /// has to be covered; each pixel's fragments take as many comparisons as the best sort of their mean number,
     /// eight at a time; each is blended, and pixels are written.
     fn floors(&self, scene: &Scene, stats: &Stats) -> [f64; 4] {
-        let vertices: f64 =
-            scene.instances().iter().map(|instance| scene.mesh(instance.mesh).positions().len() as f64).sum();
+        let meshes = scene.instances().iter().map(|instance| scene.mesh(instance.mesh));
+        let vertex_bytes = |mesh: &Mesh| mesh.positions().len() * if mesh.normals().is_some() { 24 } else { 12 };
+        let vertex_bytes: usize = meshes.map(vertex_bytes).sum();
         let (triangles, fragments) = (stats.triangles as f64, stats.fragments as f64);
         let comparisons = fragments * stats.mean_depth_complexity.max(1.0).log2();
         let pixels = f64::from(stats.width) * f64::from(stats.height);
         [
-            (vertices * 24.0 + triangles * 6.0) / self.bytes_per_ms,
+            (vertex_bytes as f64 + triangles * 6.0) / self.bytes_per_ms,
             fragments / self.covered_per_ms,
             comparisons / self.compared_per_ms,
             fragments / self.blended_per_ms + pixels * 16.0 / self.bytes_per_ms,

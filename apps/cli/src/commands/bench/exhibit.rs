@@ -181,9 +181,8 @@ fn steps(chapter: &Chapter, point: &PointResult) -> Option<Exhibit> {
 }
 
 /// Steps in the order of a frame, whichever technique has them.
-const STEP_ORDER: [&str; 26] = [
-    "transform",
-    "clip, setup and bin",
+const STEP_ORDER: [&str; 25] = [
+    "transform, setup and bin",
     "raster",
     "order",
     "shade and resolve",
