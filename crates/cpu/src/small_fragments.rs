@@ -1,4 +1,4 @@
-//! Fragments of small triangles to tiles: as they come from the meshlets of a chunk, then sorted by tile.
+//! Fragments of small triangles where they are made, those of a meshlet tile by tile, and the runs of them that each tile has.
 
 use crate::bin::{TileGrid, sort_by_tile};
 
