@@ -10,6 +10,11 @@ use pellucid_conformance::layers;
 use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
 use pellucid_cpu::{CpuRenderer, simd};
 
+#[path = "common/beside_oracle.rs"]
+mod beside_oracle;
+
+use beside_oracle::assert_equals_oracle;
+
 /// Every scene of the suite once.
 fn scenes() -> impl Iterator<Item = (&'static str, Scene)> {
     let sources: BTreeSet<&str> = CASES.iter().map(|case| case.source).collect();
@@ -122,15 +127,8 @@ fn a_canvas_shows_what_a_new_picture_shows() {
 fn deep_tiles_of_small_triangles_equal_the_oracle() {
     let scene = pellucid::load("@grids:layers=70,tessellation=10").unwrap().scene;
     let view = View::of(&scene).size(57, 32).opacity(0.1);
-    let capture = oracle::capture(&scene, &view).unwrap();
+    let capture = assert_equals_oracle(&Renderer::new(), &scene, &view);
     assert!(capture.layers.fragments.len() > 57 * 32 * 65);
-    let renderer = Renderer::new();
-    let gathered = layers::gather(&renderer, &scene, &view).unwrap();
-    if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
-        panic!("{difference}");
-    }
-    let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, Resolve::Blend);
-    assert!(expected == renderer.render(&scene, &view, Resolve::Blend).unwrap().image);
 }
 
 /// Into the geometry, behind it, and along its planes: no panic, no pixel that is not a number, and still the oracle's

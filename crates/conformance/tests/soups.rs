@@ -7,9 +7,12 @@ use pellucid::{Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, Vi
 use pellucid_conformance::{images, layers};
 use proptest::prelude::*;
 
+#[path = "common/beside_oracle.rs"]
+mod beside_oracle;
 #[path = "common/soup.rs"]
 mod soup;
 
+use beside_oracle::assert_equals_oracle;
 use soup::{camera, soup};
 
 const RESOLVES: [Resolve; 6] = [
@@ -51,14 +54,7 @@ fn meshes_of_any_size_side_by_side_equal_the_oracle() {
         scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
     }
     let view = View::of(&scene).size(75, 61);
-    let capture = oracle::capture(&scene, &view).unwrap();
-    let renderer = Renderer::new();
-    let gathered = layers::gather(&renderer, &scene, &view).unwrap();
-    if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
-        panic!("{difference}");
-    }
-    let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, Resolve::Blend);
-    assert!(expected == renderer.render(&scene, &view, Resolve::Blend).unwrap().image);
+    assert_equals_oracle(&Renderer::new(), &scene, &view);
 }
 
 proptest! {
