@@ -1,10 +1,11 @@
 //! Ordered layers to pixels: blended front to back, eight pixels at a time, until nothing behind changes a bit.
 
-use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
 use glam::{Vec3, Vec4};
 use pellucid_core::composite::Composite;
 
 use crate::fragments::COLOR;
+use crate::lit_key;
 use crate::order::{STRIP, Strip};
 use crate::simd::columns;
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
@@ -24,6 +25,12 @@ struct StripComposite<S: Simd> {
 }
 
 impl<S: Simd> StripComposite<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let zero = f32x8::splat(simd, 0.0);
+        Self { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) }
+    }
+
     /// As [`Composite::under`].
     #[inline(always)]
     fn under(&mut self, [red, green, blue, alpha]: [f32x8<S>; 4]) {
@@ -60,7 +67,10 @@ impl TileCapture {
         }
         let greatest = frame.greatest_color.max(background.truncate().abs());
         for strip in &self.order.strips {
-            let blended = self.blend_strip(simd, strip, frame, greatest);
+            let blended = match self.lit_source {
+                Some(source) => self.blend_lit_strip(simd, strip, frame.palette[source as usize], greatest),
+                None => self.blend_strip(simd, strip, frame, greatest),
+            };
             let channel = |values: f32x8<S>| -> [f32; STRIP] { values.into() };
             let (red, green, blue) = (channel(blended.red), channel(blended.green), channel(blended.blue));
             let transmittance = channel(blended.transmittance);
@@ -74,8 +84,7 @@ impl TileCapture {
 
     #[inline(always)]
     fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>, greatest: Vec3) -> StripComposite<S> {
-        let zero = f32x8::splat(simd, 0.0);
-        let mut blended = StripComposite { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) };
+        let mut blended = StripComposite::new(simd);
         let (lights, sources, colors) = self.fragments.lights_and_sources();
         for (i, row) in self.order.rows(strip).iter().enumerate() {
             let numbers = row.0.map(|key| key as u32 as usize);
@@ -90,6 +99,22 @@ impl TileCapture {
                 };
             }
             blended.under(columns(simd, &layer));
+            if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
+                break;
+            }
+        }
+        blended
+    }
+
+    /// As `blend_strip`, of layers that have one colour before lighting, and their brightness in their keys.
+    #[inline(always)]
+    fn blend_lit_strip<S: Simd>(&self, simd: S, strip: &Strip, color: Vec4, greatest: Vec3) -> StripComposite<S> {
+        let mut blended = StripComposite::new(simd);
+        let zero = f32x8::splat(simd, 0.0);
+        let [red, green, blue, alpha] = color.to_array().map(|channel| f32x8::splat(simd, channel));
+        for (i, row) in self.order.rows(strip).iter().enumerate() {
+            let (light, is_there) = lit_key::lights(simd, &row.0);
+            blended.under([red * light, green * light, blue * light, is_there.select(alpha, zero)]);
             if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
                 break;
             }

@@ -3,6 +3,7 @@
 use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdMask, SimdWiden, dispatch};
 use fearless_simd::{f32x8, mask32x8, u16x8, u32x8};
 
+use crate::lit_key;
 use crate::shade::SHADED_LANES;
 use crate::small_fragments::RunFragments;
 use crate::tile::Band;
@@ -195,8 +196,9 @@ impl Fragments {
         for (to, from) in room.samples.iter_mut().zip(run.samples) {
             *to = u32::from(*from);
         }
-        room.depths.copy_from_slice(run.depths);
-        room.lights.copy_from_slice(run.lights);
+        for ((depth, light), &key) in room.depths.iter_mut().zip(room.lights).zip(run.keys) {
+            (*depth, *light) = (lit_key::depth(key), lit_key::light(key));
+        }
         room.sources.fill(run.draw + 1);
         room.primitives.copy_from_slice(run.primitives);
         self.end += count;
@@ -213,11 +215,11 @@ impl Fragments {
         const LANES: usize = SHADED_LANES;
         let sources = u32x8::splat(simd, run.draw + 1);
         let whole = run.samples.len() / LANES * LANES;
-        for first in (0..whole).step_by(LANES) {
+        for (first, keys) in (0..whole).step_by(LANES).zip(run.keys.as_chunks().0) {
             let these = first..first + LANES;
             let (low, high) = u16x8::from_slice(simd, &run.samples[these.clone()]).widen();
             let samples = low.combine(high) - band.first;
-            let depths = f32x8::from_slice(simd, &run.depths[these.clone()]);
+            let [depths, lights] = lit_key::unpack(simd, keys);
             let mut kept = samples.simd_lt(band.count);
             if let Some(hidden) = hidden {
                 let samples: [u32; LANES] = samples.into();
@@ -231,15 +233,16 @@ impl Fragments {
             let room = self.room(LANES);
             samples.compress(kept).store_slice(room.samples);
             depths.compress(kept).store_slice(room.depths);
-            f32x8::from_slice(simd, &run.lights[these.clone()]).compress(kept).store_slice(room.lights);
+            lights.compress(kept).store_slice(room.lights);
             sources.store_slice(room.sources);
             u32x8::from_slice(simd, &run.primitives[these]).compress(kept).store_slice(room.primitives);
             self.advance(bits.count_ones() as usize);
         }
         for i in whole..run.samples.len() {
             let Some(sample) = band.sample(run.samples[i]) else { continue };
-            if hidden.is_none_or(|hidden| run.depths[i] >= hidden[sample]) {
-                self.push(sample as u32, run.depths[i], run.lights[i], run.draw + 1, run.primitives[i]);
+            let (depth, light) = (lit_key::depth(run.keys[i]), lit_key::light(run.keys[i]));
+            if hidden.is_none_or(|hidden| depth >= hidden[sample]) {
+                self.push(sample as u32, depth, light, run.draw + 1, run.primitives[i]);
             }
         }
     }

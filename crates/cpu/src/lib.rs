@@ -11,6 +11,7 @@ mod blend;
 mod canvas;
 pub mod fbuffer;
 mod fragments;
+mod lit_key;
 mod networks;
 mod order;
 mod raster;

@@ -145,13 +145,29 @@ fn exchange<S: Simd>(simd: S, near: &mut Row, far: &mut Row) {
     store(a.min(b), far);
 }
 
+/// Some bits of a key.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Bits {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+}
+
+impl Bits {
+    #[inline(always)]
+    fn of(self, key: u64) -> usize {
+        ((key >> self.first) & ((1 << self.count) - 1)) as usize
+    }
+}
+
 /// How a strip was brought into order. Where large surfaces lie behind each other the next strip shows the same ones, and
 /// what ordered one orders the other, which takes a look at each row instead of a sort.
 #[derive(Debug, Default)]
 pub(crate) struct Permutation {
+    /// Where in a key is what tells it from others of its pixel.
+    numbers: Bits,
     /// From where the row in each place came.
     from: Vec<u32>,
-    /// The row of each fragment of the first pixel, by its number in the tile.
+    /// The row of each fragment of the first pixel, by that number.
     row_of: Vec<u32>,
     ordered: Vec<Row>,
     /// Strips on which it failed since it fitted one.
@@ -165,12 +181,13 @@ impl Permutation {
     /// Strips that may fail one after another before no more are tried in a tile.
     const MOST_FAILURES: u32 = 4;
 
-    /// Begins a tile with so many numbers.
-    pub(crate) fn begin(&mut self, numbers: usize) {
+    /// Begins a tile in which keys have numbers less than `end`.
+    pub(crate) fn begin(&mut self, numbers: Bits, end: usize) {
+        self.numbers = numbers;
         self.from.clear();
         self.failures = 0;
-        if self.row_of.len() < numbers {
-            self.row_of.resize(numbers.next_power_of_two(), 0);
+        if self.row_of.len() < end {
+            self.row_of.resize(end.next_power_of_two(), 0);
         }
     }
 
@@ -202,7 +219,7 @@ impl Permutation {
     fn before(&mut self, rows: &[Row]) {
         if self.failures < Self::MOST_FAILURES {
             for (i, row) in rows.iter().enumerate() {
-                self.row_of[row.0[0] as u32 as usize] = i as u32;
+                self.row_of[self.numbers.of(row.0[0])] = i as u32;
             }
         }
     }
@@ -213,7 +230,7 @@ impl Permutation {
         self.from.clear();
         // Where the first pixel has fewer fragments than others, its keys do not tell all rows apart.
         if self.failures < Self::MOST_FAILURES && rows.last().is_some_and(|row| row.0[0] != 0) {
-            self.from.extend(rows.iter().map(|row| self.row_of[row.0[0] as u32 as usize]));
+            self.from.extend(rows.iter().map(|row| self.row_of[self.numbers.of(row.0[0])]));
         }
     }
 

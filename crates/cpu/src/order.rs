@@ -5,16 +5,18 @@
 //! Networks take no branches that depend on the keys; insertion sort (LFB chapter, section 20.4.1), pixel by pixel, takes
 //! one mispredicted branch for each pixel and about one for each fragment, which costs more than all its comparisons.
 //!
-//! A key is a fragment's depth above its number in the tile. As fragments are numbered in draw order, this orders like the
-//! contract's order key. Keys are positive and look like f64 numbers of the same order, and of those every SIMD level has
-//! maximum and minimum.
+//! A key is a fragment's depth above its number in the tile, or a [`lit_key`](crate::lit_key). As fragments are numbered in draw
+//! order, this orders like the contract's order key. Keys are positive and look like f64 numbers of the same order, and of
+//! those every SIMD level has maximum and minimum.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 
 use crate::fragments::Fragments;
-use crate::networks::{BLOCK, Permutation, sort_rows};
-use crate::tile::{FragmentCounts, TILE_SAMPLES};
+use crate::lit_key;
+use crate::networks::{BLOCK, Bits, Permutation, sort_rows};
+use crate::small_fragments::RunFragments;
+use crate::tile::{Band, FragmentCounts, TILE_SAMPLES};
 
 /// Pixels of a strip.
 pub(crate) const STRIP: usize = 8;
@@ -84,31 +86,113 @@ fn put_down(samples: &[u32], depths: &[f32], next: &mut [u32; TILE_SAMPLES], row
     }
 }
 
+/// Counts the fragments in a band, of a tile that is cut into several if `cut`.
+#[inline(never)]
+fn count<const CUT: bool>(samples: &[u16], band: Band, counts: &mut [u32; TILE_SAMPLES]) {
+    for &sample in samples {
+        if let Some(sample) = in_band::<CUT>(sample, band) {
+            counts[sample % TILE_SAMPLES] += 1;
+        }
+    }
+}
+
+/// As [`put_down`], of fragments in a band, whose keys only lack a rank.
+#[inline(never)]
+fn put_lit_down<const CUT: bool>(run: RunFragments<'_>, band: Band, next: &mut [u32; TILE_SAMPLES], keys: &mut [u64]) {
+    for (&sample, &key) in run.samples.iter().zip(run.keys) {
+        if let Some(sample) = in_band::<CUT>(sample, band) {
+            let next = &mut next[sample % TILE_SAMPLES];
+            keys[(*next & (FIRST_RANK - 1)) as usize] = key | lit_key::rank(*next >> PLACE_BITS);
+            // The last rank may be followed by 0, which nothing gets.
+            *next = next.wrapping_add(FIRST_RANK + STRIP as u32);
+        }
+    }
+}
+
+/// A sample of a tile as one of a band, which is the whole tile unless that is cut.
+#[inline(always)]
+fn in_band<const CUT: bool>(sample: u16, band: Band) -> Option<usize> {
+    if CUT { band.sample(sample) } else { Some(usize::from(sample)) }
+}
+
+/// Bits of the place where a sample's next key goes; above them is its rank.
+const PLACE_BITS: u32 = u32::BITS - lit_key::RANK_BITS;
+
+/// The first rank, above a place.
+const FIRST_RANK: u32 = 1 << PLACE_BITS;
+
+/// What there is for each sample of a tile.
+#[inline(always)]
+fn of_samples(values: &mut [u32]) -> &mut [u32; TILE_SAMPLES] {
+    values.try_into().unwrap_or_else(|_| unreachable!())
+}
+
+/// So many rows without any keys.
+fn cleared(rows: &mut Vec<Row>, count: usize) -> &mut [Row] {
+    if rows.len() < count {
+        rows.resize(count.next_power_of_two(), Row::default());
+    }
+    let rows = &mut rows[..count];
+    rows.fill(Row::default());
+    rows
+}
+
 impl Order {
     /// Orders the fragments of a tile.
     pub(crate) fn sort(&mut self, level: Level, fragments: &Fragments) -> FragmentCounts {
+        let mut totals = FragmentCounts::default();
         self.strips.clear();
         self.counts.fill(0);
-        let mut totals = FragmentCounts { fragments: fragments.len() as u64, ..FragmentCounts::default() };
         if fragments.len() == 0 {
             return totals;
         }
         let (samples, depths) = fragments.samples_and_depths();
-        let counts: &mut [u32; TILE_SAMPLES] = (&mut self.counts[..]).try_into().unwrap_or_else(|_| unreachable!());
+        let counts = of_samples(&mut self.counts);
         for &sample in &samples[1..] {
             counts[sample as usize % TILE_SAMPLES] += 1;
         }
         let row_count = self.make_strips(&mut totals);
-        if self.keys.len() < row_count {
-            self.keys.resize(row_count.next_power_of_two(), Row::default());
-        }
-        let rows = &mut self.keys[..row_count];
-        rows.fill(Row::default());
-        let next: &mut [u32; TILE_SAMPLES] = (&mut self.firsts[..]).try_into().unwrap_or_else(|_| unreachable!());
-        put_down(samples, depths, next, rows);
-        self.last.begin(fragments.len() + 1);
+        put_down(samples, depths, of_samples(&mut self.firsts), cleared(&mut self.keys, row_count));
+        self.last.begin(Bits { first: 0, count: u32::BITS }, fragments.len() + 1);
         dispatch!(level, simd => self.sort_strips(simd));
         totals
+    }
+
+    /// Orders those fragments of small triangles that lie in a band, by keys with their brightness; `None`, with nothing
+    /// done, if a pixel has too many for such keys.
+    pub(crate) fn sort_lit<'a>(
+        &mut self,
+        level: Level,
+        runs: impl Iterator<Item = RunFragments<'a>> + Clone,
+        band: Band,
+    ) -> Option<FragmentCounts> {
+        let mut totals = FragmentCounts::default();
+        self.strips.clear();
+        if runs.clone().next().is_none() {
+            return Some(totals);
+        }
+        self.counts.fill(0);
+        let counts = of_samples(&mut self.counts);
+        let count = if band.is_whole_tile() { count::<false> } else { count::<true> };
+        for run in runs.clone() {
+            count(run.samples, band, counts);
+        }
+        let row_count = self.make_strips(&mut totals);
+        if totals.greatest > lit_key::MOST_RANKS {
+            return None;
+        }
+        let firsts = of_samples(&mut self.firsts);
+        for next in firsts.iter_mut() {
+            *next |= FIRST_RANK;
+        }
+        let keys = bytemuck::cast_slice_mut(cleared(&mut self.keys, row_count));
+        let put_down = if band.is_whole_tile() { put_lit_down::<false> } else { put_lit_down::<true> };
+        for run in runs {
+            put_down(run, band, firsts, keys);
+        }
+        self.last.begin(lit_key::RANK, lit_key::MOST_RANKS as usize + 1);
+        dispatch!(level, simd => self.sort_strips(simd));
+        Some(totals)
     }
 
     #[inline(always)]
@@ -133,6 +217,7 @@ impl Order {
             if greatest == 0 {
                 continue;
             }
+            totals.fragments += u64::from(counts.iter().sum::<u32>());
             totals.covered_pixels += counts.iter().map(|&count| u64::from(count > 0)).sum::<u64>();
             totals.greatest = totals.greatest.max(greatest);
             if greatest as usize > BLOCK {
@@ -191,7 +276,7 @@ impl Order {
         row_count
     }
 
-    /// The rows of a strip: in each the number of a fragment of every pixel in the low half of a key, 0 for none.
+    /// The rows of a strip: in each the key of a fragment of every pixel, 0 for none.
     #[inline(always)]
     pub(crate) fn rows(&self, strip: &Strip) -> &[Row] {
         &self.keys[strip.first_row as usize..(strip.first_row + strip.row_count) as usize]
@@ -199,9 +284,10 @@ impl Order {
 
     /// The numbers of a sample's fragments, nearest first.
     pub(crate) fn of_sample(&self, sample: usize) -> impl Iterator<Item = u32> {
+        // A sample without fragments has no first one.
         let (first, count) = (self.firsts[sample] as usize, self.counts[sample] as usize);
         let (first, lane) = (first / STRIP, first % STRIP);
-        self.keys[first..first + count].iter().map(move |row| row.0[lane] as u32)
+        self.keys.iter().skip(first).take(count).map(move |row| row.0[lane] as u32)
     }
 
     /// Bytes held.

@@ -148,11 +148,11 @@ impl CpuRenderer {
             };
             let rows = canvas.rows(view);
             let resolver = PixelResolver::new(resolve, view);
-            run.for_each_tile(memory, begun, |frame, capture, buffers| {
+            run.for_each_tile(memory, begun, resolve == Resolve::Blend, |frame, capture, buffers| {
                 let rect = capture.rect;
                 let row = &rows[rect.top as usize / TILE_PX as usize];
                 if resolve == Resolve::Blend {
-                    if capture.fragments.len() == 0 && !capture.has_opaque {
+                    if capture.is_empty() {
                         return lock(row).leave(rect);
                     }
                     capture.blend(frame, view.background, &mut buffers.pixels);
@@ -183,7 +183,7 @@ impl CpuRenderer {
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
             let begun = run.begin(memory);
-            run.for_each_tile(memory, begun, |frame, capture, buffers| {
+            run.for_each_tile(memory, begun, false, |frame, capture, buffers| {
                 capture.layers(frame, &mut buffers.layers);
                 visit(&buffers.layers);
             });
@@ -270,11 +270,13 @@ impl<'a> Run<'a> {
         Some(WindowSetUp { grid, chunks, dropped_triangles })
     }
 
-    /// Captures every tile and hands it to `resolve`, on all threads, window by window.
+    /// Captures every tile and hands it to `resolve`, on all threads, window by window. `blends`: it does no more than to
+    /// blend fragments.
     fn for_each_tile(
         &mut self,
         memory: &mut Memory,
         begun: Begun,
+        blends: bool,
         resolve: impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync,
     ) {
         let mut counts = FragmentCounts::default();
@@ -284,7 +286,7 @@ impl<'a> Run<'a> {
             match dropped_triangles {
                 Ok(dropped_triangles) => {
                     self.stats.dropped_triangles = dropped_triangles;
-                    counts = counts.merged(self.capture_tiles(&grid, memory, &chunks, &resolve));
+                    counts = counts.merged(self.capture_tiles(&grid, memory, &chunks, blends, &resolve));
                     last.bytes += chunks.iter().map(Chunk::bytes).sum::<usize>();
                     last.windows.push(grid.window);
                 }
@@ -364,6 +366,7 @@ impl<'a> Run<'a> {
         grid: &TileGrid,
         memory: &mut Memory,
         chunks: &[Chunk],
+        blends: bool,
         resolve: &(impl Fn(FrameParts<'_>, &TileCapture, &mut TileBuffers) + Sync),
     ) -> FragmentCounts {
         let start = Instant::now();
@@ -372,6 +375,7 @@ impl<'a> Run<'a> {
             draws: &self.draws,
             palette: &self.palette,
             greatest_color: greatest_color(&self.draws),
+            blends,
             grid,
             level: self.level,
         };

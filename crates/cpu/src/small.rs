@@ -12,6 +12,7 @@ use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
 
 use crate::bin::TILE_PX;
+use crate::lit_key;
 use crate::simd::{Lookup, columns, each_lane, light, narrow, unzip, wide, widen, words};
 use crate::small_blocks::{BLOCK_BITS, BLOCK_PX, COLUMN_BITS, SmallBlock, SmallBlocks};
 use crate::small_fragments::{NewFragments, SmallFragments};
@@ -54,13 +55,12 @@ fn make_simd<S: Simd>(
         let triangles = Triangles::new(simd, blocks, draw, meshlet, vertices);
         samples.put_down(&blocks[..left.min(LANES)]);
         left = left.saturating_sub(LANES);
-        let NewFragments { samples: new_samples, depths, lights, primitives } = fragments.add(samples.count, LANES);
+        let NewFragments { samples: new_samples, keys, primitives } = fragments.add(samples.count, LANES);
         let numbers = samples.numbers[..samples.count.next_multiple_of(LANES)].as_chunks().0;
-        let (new_samples, depths) = (new_samples.as_chunks_mut().0, depths.as_chunks_mut().0);
-        let (lights, primitives) = (lights.as_chunks_mut().0, primitives.as_chunks_mut().0);
-        let room = new_samples.iter_mut().zip(depths).zip(lights).zip(primitives);
-        for (numbers, (((samples, depths), lights), primitives)) in numbers.iter().zip(room) {
-            triangles.make_fragments(simd, numbers, samples, depths, lights, primitives);
+        let (new_samples, keys) = (new_samples.as_chunks_mut().0, keys.as_chunks_mut().0);
+        let room = new_samples.iter_mut().zip(keys).zip(primitives.as_chunks_mut().0);
+        for (numbers, ((samples, keys), primitives)) in numbers.iter().zip(room) {
+            triangles.make_fragments(simd, numbers, samples, keys, primitives);
         }
     }
 }
@@ -151,8 +151,7 @@ impl<S: Simd> Triangles<S> {
         simd: S,
         numbers: &[u16; LANES],
         samples: &mut [u16; LANES],
-        depths: &mut [f32; LANES],
-        lights: &mut [f32; LANES],
+        keys: &mut [u64; LANES],
         primitives: &mut [u32; LANES],
     ) {
         let (low, high) = u16x8::load_array_ref(simd, numbers).widen();
@@ -178,8 +177,7 @@ impl<S: Simd> Triangles<S> {
                 light(simd, [looked_up(&lookup, nx, x, y), looked_up(&lookup, ny, x, y), looked_up(&lookup, nz, x, y)])
             }
         };
-        depth.store_slice(depths);
-        light.store_slice(lights);
+        lit_key::pack(depth, light, keys);
         lookup.words(self.primitive).store_slice(primitives);
     }
 }

@@ -7,9 +7,8 @@ use crate::bin::{TileGrid, sort_by_tile};
 pub(crate) struct SmallFragments {
     /// Where in its tile each one is.
     samples: Vec<u16>,
-    depths: Vec<f32>,
-    /// Brightness of the surface.
-    lights: Vec<f32>,
+    /// Depth and brightness, see [`lit_key`](crate::lit_key); without rank.
+    keys: Vec<u64>,
     primitives: Vec<u32>,
     /// How many there are; beyond is room.
     count: usize,
@@ -35,8 +34,7 @@ pub(crate) struct Run {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunFragments<'a> {
     pub(crate) samples: &'a [u16],
-    pub(crate) depths: &'a [f32],
-    pub(crate) lights: &'a [f32],
+    pub(crate) keys: &'a [u64],
     pub(crate) primitives: &'a [u32],
     pub(crate) draw: u32,
 }
@@ -44,8 +42,7 @@ pub(crate) struct RunFragments<'a> {
 /// Room for fragments.
 pub(crate) struct NewFragments<'a> {
     pub(crate) samples: &'a mut [u16],
-    pub(crate) depths: &'a mut [f32],
-    pub(crate) lights: &'a mut [f32],
+    pub(crate) keys: &'a mut [u64],
     pub(crate) primitives: &'a mut [u32],
 }
 
@@ -76,8 +73,7 @@ impl SmallFragments {
         }
         NewFragments {
             samples: &mut self.samples[first..end],
-            depths: &mut self.depths[first..end],
-            lights: &mut self.lights[first..end],
+            keys: &mut self.keys[first..end],
             primitives: &mut self.primitives[first..end],
         }
     }
@@ -86,8 +82,7 @@ impl SmallFragments {
     fn grow(&mut self, end: usize) {
         let room = (end + end / 4).max(1024);
         resize(&mut self.samples, room);
-        resize(&mut self.depths, room);
-        resize(&mut self.lights, room);
+        resize(&mut self.keys, room);
         resize(&mut self.primitives, room);
     }
 
@@ -152,6 +147,11 @@ impl<'a> TileRuns<'a> {
         self.runs.is_empty()
     }
 
+    /// All fragments.
+    pub(crate) fn all(mut self) -> impl Iterator<Item = RunFragments<'a>> + Clone {
+        std::iter::from_fn(move || self.next_before(None))
+    }
+
     /// Takes the next fragments, up to the first one of this primitive or one behind it in draw order.
     #[inline(always)]
     pub(crate) fn next_before(&mut self, primitive: Option<u32>) -> Option<RunFragments<'a>> {
@@ -172,8 +172,7 @@ impl<'a> TileRuns<'a> {
         let range = first..first + count;
         Some(RunFragments {
             samples: &self.all.samples[range.clone()],
-            depths: &self.all.depths[range.clone()],
-            lights: &self.all.lights[range.clone()],
+            keys: &self.all.keys[range.clone()],
             primitives: &self.all.primitives[range],
             draw: run.draw,
         })

@@ -11,6 +11,7 @@ use pellucid_core::{Fragment, Layers};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
 use crate::fragments::{COLOR, Fragments};
+use crate::lit_key;
 use crate::order::Order;
 use crate::raster::{Coverage, Depths, FoldState, RowFragments, cover};
 use crate::setup::{Chunk, Record};
@@ -42,6 +43,12 @@ pub(crate) struct TileCapture {
     pub(crate) fragments: Fragments,
     unshaded: Unshaded,
     pub(crate) order: Order,
+    /// The tile, and the band of it.
+    number: u32,
+    band: Band,
+    /// The source of all fragments, if their keys tell the rest: then there is nothing else in the tile, and nothing is
+    /// captured before they are ordered.
+    pub(crate) lit_source: Option<u32>,
 }
 
 /// Fragments of a tile, or of many.
@@ -63,7 +70,7 @@ impl FragmentCounts {
 }
 
 /// Samples of a tile that are captured in one go.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Band {
     pub(crate) first: u32,
     pub(crate) count: u32,
@@ -78,7 +85,7 @@ impl Band {
     }
 
     #[inline(always)]
-    fn is_whole_tile(self) -> bool {
+    pub(crate) fn is_whole_tile(self) -> bool {
         self.count == TILE_PX * TILE_PX
     }
 }
@@ -97,6 +104,9 @@ impl Default for TileCapture {
             fragments: Fragments::default(),
             unshaded: Unshaded::default(),
             order: Order::default(),
+            number: 0,
+            band: Band::default(),
+            lit_source: None,
         }
     }
 }
@@ -110,6 +120,8 @@ pub(crate) struct FrameParts<'a> {
     pub(crate) palette: &'a [Vec4],
     /// Nothing that is drawn has more of a channel than this.
     pub(crate) greatest_color: Vec3,
+    /// Whether fragments are wanted for their colours alone.
+    pub(crate) blends: bool,
     pub(crate) grid: &'a TileGrid,
     pub(crate) level: Level,
 }
@@ -136,6 +148,24 @@ impl FrameParts<'_> {
             (rows, fragments) = (rows / 2, fragments / 2);
         }
         rows
+    }
+
+    /// The source of all fragments of a tile, if there are only those of small transparent triangles of one draw.
+    fn only_source(&self, number: u32) -> Option<u32> {
+        for chunk in self.chunks {
+            let others = [&chunk.opaque, &chunk.transparent].map(|bins| bins.records.tile(number));
+            if others != [&[]; 2] || !chunk.opaque.small.tile(number).is_empty() {
+                return None;
+            }
+        }
+        let mut runs = self.small_transparent(number);
+        let draw = runs.next().map_or(0, |run| run.draw);
+        runs.all(|run| run.draw == draw).then_some(draw + 1)
+    }
+
+    /// The fragments of small transparent triangles in a tile, in draw order.
+    fn small_transparent(&self, number: u32) -> impl Iterator<Item = RunFragments<'_>> + Clone {
+        self.chunks.iter().flat_map(move |chunk| chunk.transparent.small.tile(number).all())
     }
 
     /// About how many fragments the records of a tile have.
@@ -167,26 +197,47 @@ impl TileCapture {
             bottom: tile.bottom.min(tile.top + (first + rows) as i32 - 1),
             ..tile
         };
-        let band = Band { first: first * TILE_PX, count: rows * TILE_PX };
-        dispatch!(frame.level, simd => self.capture_simd(simd, number, band, frame));
-    }
-
-    /// Orders the fragments captured.
-    pub(crate) fn sort(&mut self, frame: FrameParts<'_>) -> FragmentCounts {
-        self.order.sort(frame.level, &self.fragments)
-    }
-
-    #[inline(always)]
-    fn capture_simd<S: Simd>(&mut self, simd: S, number: u32, band: Band, frame: FrameParts<'_>) {
-        self.surfaces.clear();
-        self.fragments.clear();
-        self.fold.reset();
+        self.number = number;
+        self.band = Band { first: first * TILE_PX, count: rows * TILE_PX };
         if self.has_opaque {
             self.opaque_keys.fill(0);
             self.opaque_sources.fill(0);
             self.opaque_depths.fill(0.0);
             self.has_opaque = false;
         }
+        self.lit_source = if frame.blends { frame.only_source(number) } else { None };
+        if self.lit_source.is_none() {
+            self.capture_all(frame);
+        }
+    }
+
+    /// Orders the fragments captured.
+    pub(crate) fn sort(&mut self, frame: FrameParts<'_>) -> FragmentCounts {
+        if self.lit_source.is_some() {
+            if let Some(counts) = self.order.sort_lit(frame.level, frame.small_transparent(self.number), self.band) {
+                return counts;
+            }
+            self.lit_source = None;
+            self.capture_all(frame);
+        }
+        self.order.sort(frame.level, &self.fragments)
+    }
+
+    /// Whether nothing was captured.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.order.strips.is_empty() && !self.has_opaque
+    }
+
+    fn capture_all(&mut self, frame: FrameParts<'_>) {
+        dispatch!(frame.level, simd => self.capture_simd(simd, frame));
+    }
+
+    #[inline(always)]
+    fn capture_simd<S: Simd>(&mut self, simd: S, frame: FrameParts<'_>) {
+        let (number, band) = (self.number, self.band);
+        self.surfaces.clear();
+        self.fragments.clear();
+        self.fold.reset();
         let mut coverage = Coverage::default();
         for chunk in frame.chunks {
             let mut small = chunk.opaque.small.tile(number);
@@ -195,9 +246,9 @@ impl TileCapture {
             while let Some(run) = small.next_before(None) {
                 for (i, &sample) in run.samples.iter().enumerate() {
                     let Some(sample) = band.sample(sample) else { continue };
-                    let key = order_key(run.depths[i], run.primitives[i]);
+                    let key = order_key(lit_key::depth(run.keys[i]), run.primitives[i]);
                     if key >= self.opaque_keys[sample] {
-                        self.put_opaque(sample, key, run.lights[i], run.draw + 1);
+                        self.put_opaque(sample, key, lit_key::light(run.keys[i]), run.draw + 1);
                     }
                 }
             }
