@@ -51,13 +51,6 @@ impl TileGrid {
         self.columns as usize * self.rows as usize
     }
 
-    /// The tile that a pixel of the window is in.
-    #[inline(always)]
-    pub(crate) fn tile_at(&self, x: i32, y: i32) -> u32 {
-        let (column, row) = ((x - self.window.left) as u32 / TILE_PX, (y - self.window.top) as u32 / TILE_PX);
-        row * self.columns + column
-    }
-
     /// The pixels of a tile.
     pub(crate) fn tile(&self, number: u32) -> PixelRect {
         let left = self.window.left + (number % self.columns * TILE_PX) as i32;

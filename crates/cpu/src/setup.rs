@@ -12,7 +12,7 @@ use pellucid_core::shading::CornerNormals;
 use crate::bin::{Bins, TileGrid};
 use crate::sight::Sight;
 use crate::small::{MOST_FRAGMENTS, make_fragments};
-use crate::small_blocks::SmallBlocks;
+use crate::small_blocks::{MOST_PARTS, SmallBlocks};
 use crate::small_fragments::SmallFragments;
 use crate::transform::{Vertices, outcode};
 
@@ -200,7 +200,7 @@ impl Chunk {
         let mut sight = Sight::default();
         for (eight, corners) in meshlet.corners.iter().enumerate() {
             let first = meshlet.first_triangle + eight * LANES;
-            sight.look(simd, corners, &vertices.positions, draw, grid);
+            sight.look(simd, eight * LANES, corners, &vertices.positions, draw, grid);
             let mut records = sight.others;
             let count = meshlet.triangle_count - eight * LANES;
             if count < LANES {
@@ -209,23 +209,29 @@ impl Chunk {
             if draw.varies() {
                 records |= sight.small;
             } else {
-                let mut lanes = sight.small;
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize % LANES;
-                    lanes &= lanes - 1;
-                    if sight.maybe_many >> lane & 1 != 0 && sight.covered_count(lane) > MOST_FRAGMENTS {
+                let (mut small, mut maybe_many) = (sight.small, sight.maybe_many & sight.small);
+                while maybe_many != 0 {
+                    let lane = maybe_many.trailing_zeros() as usize % LANES;
+                    maybe_many &= maybe_many - 1;
+                    if sight.covered_count(lane) > MOST_FRAGMENTS {
                         records |= 1 << lane;
-                        continue;
+                        small &= !(1 << lane);
                     }
-                    let triangle =
-                        ((eight * LANES + lane) as u16, [corners[0][lane], corners[1][lane], corners[2][lane]]);
-                    if sight.in_parts >> lane & 1 == 0 {
-                        blocks.push(sight.tiles[lane], sight.places[lane], sight.covered(lane), triangle);
-                        continue;
+                }
+                blocks.make_room(LANES * MOST_PARTS);
+                if let [block] = sight.blocks() {
+                    // Nearly always.
+                    while small != 0 {
+                        let lane = small.trailing_zeros() as usize % LANES;
+                        small &= small - 1;
+                        blocks.push(block, lane, sight.triangles[lane], grid);
                     }
-                    for number in 0..sight.block_count {
-                        let (first, covered) = sight.block(number, lane);
-                        blocks.push_any(first, covered, triangle, grid);
+                }
+                while small != 0 {
+                    let lane = small.trailing_zeros() as usize % LANES;
+                    small &= small - 1;
+                    for block in sight.blocks() {
+                        blocks.push(block, lane, sight.triangles[lane], grid);
                     }
                 }
             }

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdMask, i32x8, u32x8, u64x8};
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdCombine, SimdMask, i32x8, u16x8, u32x4, u32x8, u64x8};
 use pellucid_core::meshlets::LANES;
 use pellucid_core::pixel_grid::{SUBPIXELS, center};
 use pellucid_core::primitive::Draw;
@@ -10,7 +10,7 @@ use pellucid_core::primitive::Draw;
 use crate::bin::{TILE_PX, TileGrid};
 use crate::simd::{each_lane, unzip};
 use crate::small::MOST_FRAGMENTS;
-use crate::small_blocks::{BLOCK_PX, COLUMN_BITS};
+use crate::small_blocks::{BLOCK_PX, BLOCKS, COLUMN_BITS, EightBlocks};
 use crate::transform::{OUTSIDE, VERTICES};
 
 /// A triangle less than so many subpixels wide and high is small: at most four blocks a side. Edge values then fit 32 bits
@@ -18,9 +18,6 @@ use crate::transform::{OUTSIDE, VERTICES};
 const SMALL_SUBPIXELS: i32 = 4 * BLOCK_PX * SUBPIXELS;
 
 const TILE_BITS: u32 = TILE_PX.ilog2();
-
-/// Blocks of samples that a small triangle may reach.
-const BLOCKS: usize = 16;
 
 /// What is known of eight triangles; a bit for each in a mask.
 #[derive(Default)]
@@ -31,33 +28,21 @@ pub(crate) struct Sight {
     pub(crate) maybe_many: u32,
     /// Others that may be in sight: large ones, and those with a corner that cannot be projected.
     pub(crate) others: u32,
-    /// Small ones whose bounds reach into several tiles or blocks.
-    pub(crate) in_parts: u32,
-    /// The first sample of the small ones' bounds, as in [`SmallBlock`](crate::small_blocks::SmallBlock), and the tile it is
-    /// in.
-    pub(crate) places: [u32; LANES],
-    pub(crate) tiles: [u32; LANES],
-    /// Blocks that one of the small ones reaches, from each one's first sample on.
-    pub(crate) block_count: usize,
-    blocks: [Block; BLOCKS],
-}
-
-/// A block of samples at the same place in the bounds of all eight triangles.
-#[derive(Clone, Copy, Default)]
-struct Block {
-    /// From the first sample of the bounds.
-    across: i32,
-    down: i32,
-    /// Which samples each triangle covers, row by row.
-    covered: [u64; LANES],
+    /// What the small ones cover: blocks that one of them reaches, from each one's first sample on; beyond `block_count` is
+    /// room.
+    blocks: [EightBlocks; BLOCKS],
+    block_count: usize,
+    /// The eight triangles as [`SmallBlock`](crate::small_blocks::SmallBlock) has them.
+    pub(crate) triangles: [[u16; 4]; LANES],
 }
 
 impl Sight {
-    /// Looks at eight triangles of a draw: at the vertices that are their corners.
+    /// Looks at eight triangles of a draw, from a number in the meshlet on: at the vertices that are their corners.
     #[inline(always)]
     pub(crate) fn look<S: Simd>(
         &mut self,
         simd: S,
+        number: usize,
         [a, b, c]: &[[u16; LANES]; 3],
         positions: &[[i32; 2]; VERTICES],
         draw: &Draw<'_>,
@@ -93,12 +78,7 @@ impl Sight {
         if self.small == 0 {
             return;
         }
-        self.places = ((top << COLUMN_BITS) | left).bitcast::<u32x8<S>>().into();
-        let (column, row) = ((left - grid.window.left) >> TILE_BITS, (top - grid.window.top) >> TILE_BITS);
-        self.tiles = (row * grid.columns as i32 + column).bitcast::<u32x8<S>>().into();
-        let leaves_tile =
-            (left >> TILE_BITS).simd_lt(right >> TILE_BITS) | (top >> TILE_BITS).simd_lt(bottom >> TILE_BITS);
-        self.in_parts = leaves_tile.to_bitmask() as u32;
+        self.triangles = numbered(simd, [a, b, c], number);
         let (bx, cx) = (swapped.select(cx, bx), swapped.select(bx, cx));
         let (by, cy) = (swapped.select(cy, by), swapped.select(by, cy));
         let (width, height) = (right - left + 1, bottom - top + 1);
@@ -118,7 +98,19 @@ impl Sight {
                 let [first, second] = if cfg!(target_endian = "little") { [upper, lower] } else { [lower, upper] };
                 let (low, high) = first.interleave(second);
                 let covered = low.combine(high).bitcast::<u64x8<S>>().into();
-                self.blocks[self.block_count % BLOCKS] = Block { across, down, covered };
+                let (left, top) = (left + across, top + down);
+                let (last_column, last_row) = (right.min(left + (BLOCK_PX - 1)), bottom.min(top + (BLOCK_PX - 1)));
+                let leaves_tile = (left >> TILE_BITS).simd_lt(last_column >> TILE_BITS)
+                    | (top >> TILE_BITS).simd_lt(last_row >> TILE_BITS);
+                let (column, row) = ((left - grid.window.left) >> TILE_BITS, (top - grid.window.top) >> TILE_BITS);
+                let firsts: u32x8<S> = ((top << COLUMN_BITS) | left).bitcast();
+                let (low, high) = firsts.interleave((row * grid.columns as i32 + column).bitcast::<u32x8<S>>());
+                let eight = &mut self.blocks[self.block_count % BLOCKS];
+                (eight.across, eight.down, eight.covered) = (across, down, covered);
+                eight.leave_tile = leaves_tile.to_bitmask() as u32;
+                let (first_places, last_places) = eight.places.as_flattened_mut().split_at_mut(LANES);
+                low.store_slice(first_places);
+                high.store_slice(last_places);
                 self.block_count += 1;
                 for edge in &mut block {
                     edge.value += edge.right * BLOCK_PX;
@@ -134,7 +126,6 @@ impl Sight {
             self.leave_out_beyond(&width.into(), &height.into());
         }
         if self.block_count > 1 {
-            self.in_parts = self.small;
             self.maybe_many = (width * height).simd_gt(MOST_FRAGMENTS as i32).to_bitmask() as u32;
         }
     }
@@ -145,7 +136,7 @@ impl Sight {
     #[inline(never)]
     fn leave_out_beyond(&mut self, columns: &[i32; LANES], rows: &[i32; LANES]) {
         let mut small = 0;
-        for Block { across, down, covered } in &mut self.blocks[..self.block_count] {
+        for EightBlocks { across, down, covered, .. } in &mut self.blocks[..self.block_count] {
             for (lane, covered) in covered.iter_mut().enumerate() {
                 *covered &= columns_mask(columns[lane] - *across) & rows_mask(rows[lane] - *down);
                 small |= u32::from(*covered != 0) << lane;
@@ -154,24 +145,32 @@ impl Sight {
         self.small &= small;
     }
 
-    /// A block's first sample in the bounds of a triangle, and which of its samples that covers, row by row.
+    /// What there is of the small ones.
     #[inline(always)]
-    pub(crate) fn block(&self, number: usize, lane: usize) -> ([i32; 2], u64) {
-        let Block { across, down, covered } = &self.blocks[number % BLOCKS];
-        let place = self.places[lane] as i32;
-        ([(place & ((1 << COLUMN_BITS) - 1)) + across, (place >> COLUMN_BITS) + down], covered[lane])
-    }
-
-    /// Which samples of the first block a triangle covers.
-    #[inline(always)]
-    pub(crate) fn covered(&self, lane: usize) -> u64 {
-        self.blocks[0].covered[lane]
+    pub(crate) fn blocks(&self) -> &[EightBlocks] {
+        &self.blocks[..self.block_count]
     }
 
     /// How many samples a small triangle covers.
     pub(crate) fn covered_count(&self, lane: usize) -> u32 {
-        (0..self.block_count).map(|number| self.block(number, lane).1.count_ones()).sum()
+        self.blocks().iter().map(|block| block.covered[lane].count_ones()).sum()
     }
+}
+
+/// The corners of eight triangles, triangle by triangle, each with its number, the first of which is given.
+#[inline(always)]
+fn numbered<S: Simd>(simd: S, [a, b, c]: [&[u16; LANES]; 3], first: usize) -> [[u16; 4]; LANES] {
+    let numbers = each_lane(|lane| lane as u16).map(|lane| first as u16 + lane);
+    let columns = [a, b, c, &numbers].map(|column| u16x8::load_array_ref(simd, column));
+    let ((ab, last_ab), (cn, last_cn)) = (columns[0].interleave(columns[1]), columns[2].interleave(columns[3]));
+    let mut rows = [[0; 4]; LANES];
+    for (rows, [ab, cn]) in rows.as_chunks_mut::<4>().0.iter_mut().zip([[ab, cn], [last_ab, last_cn]]) {
+        let (first, last) = ab.bitcast::<u32x4<S>>().interleave(cn.bitcast::<u32x4<S>>());
+        let (first_rows, last_rows) = rows.as_flattened_mut().split_at_mut(LANES);
+        first.bitcast::<u16x8<S>>().store_slice(first_rows);
+        last.bitcast::<u16x8<S>>().store_slice(last_rows);
+    }
+    rows
 }
 
 /// The first so many columns of a block.

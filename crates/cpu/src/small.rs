@@ -95,7 +95,7 @@ impl<S: Simd> Triangles<S> {
     /// Those of eight blocks.
     #[inline(always)]
     fn new(simd: S, blocks: &[SmallBlock; LANES], draw: &Draw<'_>, meshlet: &Meshlet<'_>, vertices: &Vertices) -> Self {
-        let numbers = u32x8::load_array(simd, each_lane(|lane| u32::from(blocks[lane].triangle)));
+        let numbers = u32x8::load_array(simd, each_lane(|lane| u32::from(blocks[lane].triangle[3])));
         // The planes of weights and of depth, as `ScreenTriangle` has them. Corners need not run clockwise: if they do not, area
         // and weights are negated, and the second and third weight change places, of which neither changes a bit.
         let (a, lit_a) = corners_at(simd, blocks, 0, vertices);
@@ -124,7 +124,7 @@ impl<S: Simd> Triangles<S> {
         let [a_z, b_z, c_z] = [lit_a[0], lit_b[0], lit_c[0]];
         let first_z = widen(a_z);
         let (to_second, to_third) = (widen(b_z) - first_z, widen(c_z) - first_z);
-        let places = i32x8::load_array(simd, each_lane(|lane| blocks[lane].place as i32));
+        let places = i32x8::load_array(simd, each_lane(|lane| blocks[lane].place[0] as i32));
         let (left, top) = (places & ((1 << COLUMN_BITS) - 1), places >> COLUMN_BITS);
         let last = TILE_PX as i32 - 1;
         Self {
@@ -244,7 +244,7 @@ fn corners_at<S: Simd>(
     k: usize,
     vertices: &Vertices,
 ) -> ([i32x8<S>; 2], [f32x8<S>; 4]) {
-    let vertex = |lane: usize| usize::from(blocks[lane].corners[k]);
+    let vertex = |lane: usize| usize::from(blocks[lane].triangle[k]);
     let positions = unzip(simd, each_lane(|lane| vertices.positions[vertex(lane)]));
     (positions, columns(simd, &each_lane(|lane| vertices.lit[vertex(lane)])))
 }

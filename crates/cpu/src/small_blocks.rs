@@ -16,14 +16,25 @@ pub(crate) const BLOCK_BITS: u32 = 6;
 pub(crate) struct SmallBlock {
     /// Row by row.
     pub(crate) covered: u64,
-    /// The first sample: column, and row above it.
-    pub(crate) place: u32,
-    /// Number of the triangle in the meshlet.
-    pub(crate) triangle: u16,
-    /// The place of its tile among those of the meshlet.
-    tile: u32,
-    /// Vertices of the meshlet.
-    pub(crate) corners: [u16; 3],
+    /// The corners' numbers among the vertices of the meshlet, and that of the triangle in it.
+    pub(crate) triangle: [u16; 4],
+    pub(crate) place: Place,
+}
+
+/// Where a block's first sample is: column, and row above it; and the tile.
+pub(crate) type Place = [u32; 2];
+
+/// A block of samples at the same place in the bounds of each of eight triangles.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct EightBlocks {
+    /// From the first sample of the bounds.
+    pub(crate) across: i32,
+    pub(crate) down: i32,
+    /// Which samples each triangle covers, row by row.
+    pub(crate) covered: [u64; LANES],
+    pub(crate) places: [Place; LANES],
+    /// Those that may cover samples in several tiles: a bit for each.
+    pub(crate) leave_tile: u32,
 }
 
 /// Bits of a sample's column in a block's place.
@@ -32,28 +43,31 @@ pub(crate) const COLUMN_BITS: u32 = 16;
 /// The blocks of a meshlet.
 #[derive(Debug, Default)]
 pub(crate) struct SmallBlocks {
-    /// In draw order.
+    /// In draw order; beyond `count` is room.
     blocks: Vec<SmallBlock>,
-    tiles: Vec<TileBlocks>,
-    /// For each tile of the window its place among those of the meshlet plus 1, or 0.
-    places_of_tiles: Vec<u32>,
+    count: usize,
+    /// The tiles that they lie in.
+    tiles: Vec<u32>,
+    /// For each tile of the window how many fragments there are, and blocks times [`BLOCK`]; while they are sorted, where
+    /// its next block goes.
+    in_tiles: Vec<u64>,
     /// Tile by tile, each tile's in draw order; filled up to a multiple of eight with any of them.
     sorted: Vec<SmallBlock>,
     /// What eight of them cover.
     samples: Samples,
 }
 
-/// A tile that blocks of the meshlet lie in.
-#[derive(Debug, Clone, Copy)]
-struct TileBlocks {
-    tile: u32,
-    fragments: u32,
-    /// How many blocks, then where the next one goes.
-    blocks: u32,
-}
+/// One block among those counted for a tile, above its fragments.
+const BLOCK: u64 = 1 << 32;
+
+/// Blocks that a triangle may have, parts of them in several tiles counted.
+pub(crate) const MOST_PARTS: usize = 4 * BLOCKS;
+
+/// Blocks of samples that a small triangle may reach.
+pub(crate) const BLOCKS: usize = 16;
 
 /// The last column or row of a tile.
-const LAST: i32 = TILE_PX as i32 - 1;
+const LAST: u32 = TILE_PX - 1;
 
 /// Of a block whose first sample is in this column of its tile, the samples beyond the tile.
 const BEYOND_RIGHT: [u64; TILE_PX as usize] = beyond(0x0101_0101_0101_0101, 1);
@@ -76,110 +90,128 @@ const fn beyond(first: u64, distance: u32) -> [u64; TILE_PX as usize] {
     all
 }
 
+/// Shifted right, by any number of bits.
+#[inline(always)]
+fn shifted(samples: u64, bits: u32) -> u64 {
+    samples.checked_shr(bits).unwrap_or_default()
+}
+
 impl SmallBlocks {
     /// Makes ready for blocks in a window.
     pub(crate) fn begin(&mut self, grid: &TileGrid) {
-        self.places_of_tiles.resize(grid.tile_count(), 0);
+        self.in_tiles.resize(grid.tile_count(), 0);
     }
 
-    /// Adds what a triangle covers of a block that lies in one tile.
+    /// Makes room for so many more.
     #[inline(always)]
-    pub(crate) fn push(&mut self, tile: u32, place: u32, covered: u64, (triangle, corners): (u16, [u16; 3])) {
-        let mut place_of_tile = self.places_of_tiles[tile as usize];
-        if place_of_tile == 0 {
-            place_of_tile = self.add_tile(tile);
-        }
-        let tile = place_of_tile - 1;
-        let in_tile = &mut self.tiles[tile as usize];
-        in_tile.blocks += 1;
-        in_tile.fragments += covered.count_ones();
-        self.blocks.push(SmallBlock { covered, place, triangle, tile, corners });
-    }
-
-    /// Adds what a triangle covers of any block.
-    #[inline(always)]
-    pub(crate) fn push_any(&mut self, [left, top]: [i32; 2], covered: u64, triangle: (u16, [u16; 3]), grid: &TileGrid) {
-        let beyond = BEYOND_RIGHT[(left & LAST) as usize] | BEYOND_BELOW[(top & LAST) as usize];
-        if covered & beyond != 0 {
-            self.push_parts([left, top], covered, triangle, grid);
-        } else if covered != 0 {
-            self.push(grid.tile_at(left, top), (top << COLUMN_BITS | left) as u32, covered, triangle);
+    pub(crate) fn make_room(&mut self, count: usize) {
+        if self.blocks.len() < self.count + count {
+            self.grow(count);
         }
     }
 
-    /// Adds a block cut along the borders of tiles.
+    #[cold]
+    fn grow(&mut self, count: usize) {
+        let room = self.count + count;
+        self.blocks.resize(room + room / 4, SmallBlock::default());
+    }
+
+    /// Adds what one of eight triangles covers. There must be room for [`MOST_PARTS`].
+    #[inline(always)]
+    pub(crate) fn push(&mut self, eight: &EightBlocks, lane: usize, triangle: [u16; 4], grid: &TileGrid) {
+        let (covered, place) = (eight.covered[lane], eight.places[lane]);
+        if covered == 0 {
+            return;
+        }
+        if eight.leave_tile >> lane & 1 == 0 {
+            self.push_block(covered, triangle, place);
+        } else {
+            self.push_parts(covered, triangle, place, grid.columns);
+        }
+    }
+
+    #[inline(always)]
+    fn push_block(&mut self, covered: u64, triangle: [u16; 4], place: Place) {
+        let [_, tile] = place;
+        let in_tile = &mut self.in_tiles[tile as usize];
+        if *in_tile == 0 {
+            self.tiles.push(tile);
+        }
+        *in_tile += BLOCK + u64::from(covered.count_ones());
+        self.blocks[self.count] = SmallBlock { covered, triangle, place };
+        self.count += 1;
+    }
+
+    /// Adds a block tile by tile, of which there are so many columns.
     #[inline(never)]
-    fn push_parts(&mut self, [left, top]: [i32; 2], covered: u64, triangle: (u16, [u16; 3]), grid: &TileGrid) {
-        let (column, row) = (left & LAST, top & LAST);
-        let (right, below) = (BEYOND_RIGHT[column as usize], BEYOND_BELOW[row as usize]);
-        for (in_rows, down) in [(!below, 0), (below, TILE_PX as i32 - row)] {
-            for (in_columns, across) in [(!right, 0), (right, TILE_PX as i32 - column)] {
-                let covered = covered & in_rows & in_columns;
-                if covered != 0 {
-                    let (left, top) = (left + across, top + down);
-                    let place = (top << COLUMN_BITS | left) as u32;
-                    self.push(grid.tile_at(left, top), place, covered >> (down * BLOCK_PX + across), triangle);
-                }
+    fn push_parts(&mut self, covered: u64, triangle: [u16; 4], [first, tile]: Place, columns: u32) {
+        let (column, row) = (first & LAST, first >> COLUMN_BITS & LAST);
+        let (right, below) = (covered & BEYOND_RIGHT[column as usize], covered & BEYOND_BELOW[row as usize]);
+        let (to_right, down) = (TILE_PX - column, TILE_PX - row);
+        let mut push = |covered: u64, place: Place| {
+            if covered != 0 {
+                self.push_block(covered, triangle, place);
             }
+        };
+        push(covered & !(right | below), [first, tile]);
+        if right | below != 0 {
+            let (first_right, first_below) = (first + to_right, first + (down << COLUMN_BITS));
+            let lower = BLOCK_PX as u32 * down;
+            push(shifted(right & !below, to_right), [first_right, tile + 1]);
+            push(shifted(below & !right, lower), [first_below, tile + columns]);
+            push(shifted(below & right, lower + to_right), [first_below + to_right, tile + columns + 1]);
         }
-    }
-
-    #[inline(never)]
-    fn add_tile(&mut self, tile: u32) -> u32 {
-        self.tiles.push(TileBlocks { tile, fragments: 0, blocks: 0 });
-        let place = self.tiles.len() as u32;
-        self.places_of_tiles[tile as usize] = place;
-        place
     }
 
     pub(crate) fn is_empty(&self) -> bool {
-        self.blocks.is_empty()
+        self.count == 0
     }
 
     pub(crate) fn clear(&mut self) {
-        self.blocks.clear();
+        self.count = 0;
         for tile in self.tiles.drain(..) {
-            self.places_of_tiles[tile.tile as usize] = 0;
+            self.in_tiles[tile as usize] = 0;
         }
     }
 
     /// Sorts those of a draw by tile, keeping draw order, and tells how many fragments each tile gets.
     pub(crate) fn sort_by_tile(&mut self, draw: u32, fragments: &mut SmallFragments) {
         let mut sum = 0;
-        for tile in &mut self.tiles {
-            fragments.add_run(tile.tile, tile.fragments, draw);
-            sum += std::mem::replace(&mut tile.blocks, sum);
+        for &tile in &self.tiles {
+            let in_tile = &mut self.in_tiles[tile as usize];
+            fragments.add_run(tile, *in_tile as u32, draw);
+            sum += std::mem::replace(in_tile, sum) / BLOCK;
         }
-        let room = self.blocks.len().next_multiple_of(LANES);
+        let room = self.count.next_multiple_of(LANES);
         if self.sorted.len() < room {
             self.sorted.resize(room, SmallBlock::default());
         }
-        for block in &self.blocks {
-            let next = &mut self.tiles[block.tile as usize].blocks;
+        for block in &self.blocks[..self.count] {
+            let next = &mut self.in_tiles[block.place[1] as usize];
             self.sorted[*next as usize] = *block;
             *next += 1;
         }
-        if let Some(&any) = self.blocks.last() {
-            self.sorted[self.blocks.len()..room].fill(any);
+        if let Some(&any) = self.blocks[..self.count].last() {
+            self.sorted[self.count..room].fill(any);
         }
     }
 
     /// What was sorted, eight at a time, and room for samples of eight. Beyond the last, any of them.
     #[inline(always)]
     pub(crate) fn sorted(&mut self) -> (&[[SmallBlock; LANES]], &mut Samples) {
-        let room = self.blocks.len().next_multiple_of(LANES);
+        let room = self.count.next_multiple_of(LANES);
         (self.sorted[..room].as_chunks().0, &mut self.samples)
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.blocks.len()
+        self.count
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         (self.blocks.capacity() + self.sorted.capacity()) * size_of::<SmallBlock>()
-            + self.places_of_tiles.capacity() * 4
-            + self.tiles.capacity() * size_of::<TileBlocks>()
+            + self.in_tiles.capacity() * 8
+            + self.tiles.capacity() * 4
     }
 }
 
@@ -204,11 +236,11 @@ impl Samples {
     /// Puts down which samples are covered.
     #[inline(always)]
     pub(crate) fn put_down(&mut self, blocks: &[SmallBlock]) {
-        self.count = 0;
+        let mut end = 0;
         for (lane, SmallBlock { covered, .. }) in blocks.iter().enumerate() {
             let lane = (lane << BLOCK_BITS) as u16;
             let mut bits = *covered;
-            let mut at = self.count;
+            let mut at = end;
             for number in &mut self.numbers[at..at + WITHOUT_ASKING] {
                 *number = lane | bits.trailing_zeros() as u16;
                 bits &= bits.wrapping_sub(1);
@@ -218,7 +250,8 @@ impl Samples {
                 bits &= bits - 1;
                 at += 1;
             }
-            self.count += covered.count_ones() as usize;
+            end += covered.count_ones() as usize;
         }
+        self.count = end;
     }
 }
