@@ -2,12 +2,11 @@
 
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
 use glam::{Vec3, Vec4};
-use pellucid_core::composite::Composite;
 
 use crate::fragments::COLOR;
 use crate::lit_key;
 use crate::order::{STRIP, Strip};
-use crate::simd::columns;
+use crate::simd::{columns, each_lane, rows};
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
 /// Layers blended between two looks at whether anything behind them still counts.
@@ -31,13 +30,25 @@ impl<S: Simd> StripComposite<S> {
         Self { red: zero, green: zero, blue: zero, transmittance: f32x8::splat(simd, 1.0) }
     }
 
-    /// As [`Composite::under`].
+    /// As [`Composite::under`](pellucid_core::composite::Composite::under).
     #[inline(always)]
     fn under(&mut self, [red, green, blue, alpha]: [f32x8<S>; 4]) {
         self.red += red * self.transmittance;
         self.green += green * self.transmittance;
         self.blue += blue * self.transmittance;
         self.transmittance *= 1.0 - alpha;
+    }
+
+    /// As [`Composite::over`](pellucid_core::composite::Composite::over).
+    #[inline(always)]
+    fn over(self, [red, green, blue, alpha]: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
+        let Self { transmittance, .. } = self;
+        [
+            self.red + red * transmittance,
+            self.green + green * transmittance,
+            self.blue + blue * transmittance,
+            (1.0 - transmittance) + alpha * transmittance,
+        ]
     }
 
     /// Whether nothing behind changes a bit of any pixel, as none of it has more of a channel than `greatest`.
@@ -71,13 +82,11 @@ impl TileCapture {
                 Some(source) => self.blend_lit_strip(simd, strip, frame.palette[source as usize], greatest),
                 None => self.blend_strip(simd, strip, frame, greatest),
             };
-            let channel = |values: f32x8<S>| -> [f32; STRIP] { values.into() };
-            let (red, green, blue) = (channel(blended.red), channel(blended.green), channel(blended.blue));
-            let transmittance = channel(blended.transmittance);
-            for lane in 0..strip.sample_count as usize {
-                let pixel = &mut pixels[strip.samples[lane] as usize % TILE_SAMPLES];
-                let color = Vec3::new(red[lane], green[lane], blue[lane]);
-                *pixel = Composite { color, transmittance: transmittance[lane] }.over(*pixel);
+            let behind = each_lane(|lane| pixels[strip.samples[lane] as usize % TILE_SAMPLES].to_array());
+            let mut colors = [[0.0; 4]; STRIP];
+            rows(simd, blended.over(columns(simd, &behind)), &mut colors);
+            for (color, &sample) in colors.iter().zip(&strip.samples[..strip.sample_count as usize]) {
+                pixels[sample as usize % TILE_SAMPLES] = Vec4::from_array(*color);
             }
         }
     }

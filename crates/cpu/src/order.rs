@@ -10,11 +10,12 @@
 //! those every SIMD level has maximum and minimum.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, i32x8, u32x8};
 
 use crate::fragments::Fragments;
 use crate::lit_key;
 use crate::networks::{BLOCK, Bits, Permutation, sort_rows};
+use crate::simd::each_lane;
 use crate::small_fragments::RunFragments;
 use crate::tile::{Band, FragmentCounts, TILE_SAMPLES};
 
@@ -24,9 +25,10 @@ pub(crate) const STRIP: usize = 8;
 /// The order of a tile's fragments.
 #[derive(Debug)]
 pub(crate) struct Order {
-    /// How many fragments each sample has, and where its first key stands; its next ones stand [`STRIP`] further each.
+    /// How many fragments each sample has, and where its first key stands, then that beyond its last; each one stands
+    /// [`STRIP`] further.
     counts: Vec<u32>,
-    firsts: Vec<u32>,
+    next: Vec<u32>,
     pub(crate) strips: Vec<Strip>,
     /// Rows of all strips. Where a pixel has fewer fragments than its strip has rows, the last ones are 0.
     keys: Vec<Row>,
@@ -54,7 +56,7 @@ impl Default for Order {
     fn default() -> Self {
         Self {
             counts: vec![0; TILE_SAMPLES],
-            firsts: vec![0; TILE_SAMPLES],
+            next: vec![0; TILE_SAMPLES],
             strips: Vec::new(),
             keys: Vec::new(),
             last: Permutation::default(),
@@ -151,8 +153,8 @@ impl Order {
         for &sample in &samples[1..] {
             counts[sample as usize % TILE_SAMPLES] += 1;
         }
-        let row_count = self.make_strips(&mut totals);
-        put_down(samples, depths, of_samples(&mut self.firsts), cleared(&mut self.keys, row_count));
+        let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
+        put_down(samples, depths, of_samples(&mut self.next), cleared(&mut self.keys, row_count));
         self.last.begin(Bits { first: 0, count: u32::BITS }, fragments.len() + 1);
         dispatch!(level, simd => self.sort_strips(simd));
         totals
@@ -177,18 +179,18 @@ impl Order {
         for run in runs.clone() {
             count(run.samples, band, counts);
         }
-        let row_count = self.make_strips(&mut totals);
+        let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
         if totals.greatest > lit_key::MOST_RANKS {
             return None;
         }
-        let firsts = of_samples(&mut self.firsts);
-        for next in firsts.iter_mut() {
+        let next = of_samples(&mut self.next);
+        for next in next.iter_mut() {
             *next |= FIRST_RANK;
         }
         let keys = bytemuck::cast_slice_mut(cleared(&mut self.keys, row_count));
         let put_down = if band.is_whole_tile() { put_lit_down::<false> } else { put_lit_down::<true> };
         for run in runs {
-            put_down(run, band, firsts, keys);
+            put_down(run, band, next, keys);
         }
         self.last.begin(lit_key::RANK, lit_key::MOST_RANKS as usize + 1);
         dispatch!(level, simd => self.sort_strips(simd));
@@ -199,26 +201,28 @@ impl Order {
     fn sort_strips<S: Simd>(&mut self, simd: S) {
         for strip in &self.strips {
             let (first, count) = (strip.first_row as usize, strip.row_count as usize);
-            for (lane, &sample) in strip.samples[..strip.sample_count as usize].iter().enumerate() {
-                self.firsts[sample as usize] = (first * STRIP + lane) as u32;
-            }
             sort_rows(simd, &mut self.keys[first..first + count], &mut self.last);
         }
     }
 
     /// Puts the samples that have fragments together into strips; returns how many rows these have. Neighbours that have
     /// few are a strip, however few; others are first sorted by how many.
-    fn make_strips(&mut self, totals: &mut FragmentCounts) -> usize {
+    #[inline(always)]
+    fn make_strips<S: Simd>(&mut self, simd: S, totals: &mut FragmentCounts) -> usize {
+        let lanes = u32x8::load_array(simd, each_lane(|lane| lane as u32));
+        let mut fragments = u32x8::splat(simd, 0);
         let mut row_count = 0;
         let mut many = [0u16; TILE_SAMPLES / STRIP];
         let mut many_count = 0;
         for (group, counts) in self.counts.as_chunks::<STRIP>().0.iter().enumerate() {
-            let greatest = counts.iter().fold(0, |greatest, &count| greatest.max(count));
-            if greatest == 0 {
+            let counts = u32x8::load_array_ref(simd, counts);
+            let covered = counts.bitcast::<i32x8<S>>().simd_gt(0).to_bitmask();
+            if covered == 0 {
                 continue;
             }
-            totals.fragments += u64::from(counts.iter().sum::<u32>());
-            totals.covered_pixels += counts.iter().map(|&count| u64::from(count > 0)).sum::<u64>();
+            fragments += counts;
+            totals.covered_pixels += u64::from(covered.count_ones());
+            let greatest = counts.reduce_max();
             totals.greatest = totals.greatest.max(greatest);
             if greatest as usize > BLOCK {
                 many[many_count] = group as u16;
@@ -227,13 +231,12 @@ impl Order {
             }
             let first = group * STRIP;
             let samples = std::array::from_fn(|lane| (first + lane) as u16);
-            for (lane, key) in self.firsts[first..first + STRIP].iter_mut().enumerate() {
-                *key = (row_count * STRIP + lane) as u32;
-            }
+            (lanes + (row_count * STRIP) as u32).store_slice(&mut self.next[first..first + STRIP]);
             let strip = Strip { first_row: row_count as u32, row_count: greatest, samples, sample_count: STRIP as u32 };
             self.strips.push(strip);
             row_count += greatest as usize;
         }
+        totals.fragments += u64::from(fragments.reduce_sum());
         if many_count > 0 {
             row_count = self.make_strips_by_count(&many[..many_count], row_count);
         }
@@ -268,7 +271,7 @@ impl Order {
             for (lane, &sample) in samples.iter().enumerate() {
                 strip.samples[lane] = sample;
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);
-                self.firsts[sample as usize] = (row_count * STRIP + lane) as u32;
+                self.next[sample as usize] = (row_count * STRIP + lane) as u32;
             }
             row_count += strip.row_count as usize;
             self.strips.push(strip);
@@ -285,8 +288,8 @@ impl Order {
     /// The numbers of a sample's fragments, nearest first.
     pub(crate) fn of_sample(&self, sample: usize) -> impl Iterator<Item = u32> {
         // A sample without fragments has no first one.
-        let (first, count) = (self.firsts[sample] as usize, self.counts[sample] as usize);
-        let (first, lane) = (first / STRIP, first % STRIP);
+        let (next, count) = (self.next[sample] as usize, self.counts[sample] as usize);
+        let (first, lane) = ((next / STRIP).saturating_sub(count), next % STRIP);
         self.keys.iter().skip(first).take(count).map(move |row| row.0[lane] as u32)
     }
 
