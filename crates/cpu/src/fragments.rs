@@ -200,7 +200,9 @@ impl Fragments {
             (*depth, *light) = (lit_key::depth(key), lit_key::light(key));
         }
         room.sources.fill(run.draw + 1);
-        room.primitives.copy_from_slice(run.primitives);
+        for (primitive, &triangle) in room.primitives.iter_mut().zip(run.triangles) {
+            *primitive = run.first_primitive + u32::from(triangle);
+        }
         self.end += count;
     }
 
@@ -235,14 +237,15 @@ impl Fragments {
             depths.compress(kept).store_slice(room.depths);
             lights.compress(kept).store_slice(room.lights);
             sources.store_slice(room.sources);
-            u32x8::from_slice(simd, &run.primitives[these]).compress(kept).store_slice(room.primitives);
+            let (low, high) = u16x8::from_slice(simd, &run.triangles[these]).widen();
+            (low.combine(high) + run.first_primitive).compress(kept).store_slice(room.primitives);
             self.advance(bits.count_ones() as usize);
         }
         for i in whole..run.samples.len() {
             let Some(sample) = band.sample(run.samples[i]) else { continue };
             let (depth, light) = (lit_key::depth(run.keys[i]), lit_key::light(run.keys[i]));
             if hidden.is_none_or(|hidden| depth >= hidden[sample]) {
-                self.push(sample as u32, depth, light, run.draw + 1, run.primitives[i]);
+                self.push(sample as u32, depth, light, run.draw + 1, run.primitive(i));
             }
         }
     }

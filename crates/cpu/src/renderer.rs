@@ -375,7 +375,6 @@ impl<'a> Run<'a> {
             draws: &self.draws,
             palette: &self.palette,
             greatest_color: greatest_color(&self.draws),
-            blends,
             grid,
             level: self.level,
         };
@@ -396,9 +395,10 @@ impl<'a> Run<'a> {
             let mut times = [Duration::ZERO; 3];
             while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let mut started = Instant::now();
-                let rows = frame.band_rows(tile, records[tile as usize], small[tile as usize]);
+                let lit_source = if blends { frame.only_source(tile) } else { None };
+                let rows = frame.band_rows(tile, records[tile as usize], small[tile as usize], lit_source);
                 for first in (0..grid.tile_rows(tile)).step_by(rows as usize) {
-                    worker.capture.capture(tile, [first, rows], frame);
+                    worker.capture.capture(tile, [first, rows], lit_source, frame);
                     let captured = Instant::now();
                     counts = counts.merged(worker.capture.sort(frame));
                     let ordered = Instant::now();

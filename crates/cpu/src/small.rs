@@ -35,7 +35,7 @@ pub(crate) fn make_fragments(
     vertices: &Vertices,
     fragments: &mut SmallFragments,
 ) {
-    blocks.sort_by_tile(draw_number, fragments);
+    blocks.sort_by_tile([draw_number, draw.first_primitive + meshlet.first_triangle as u32], fragments);
     dispatch!(level, simd => make_simd(simd, blocks, draw, meshlet, vertices, fragments));
     blocks.clear();
 }
@@ -55,12 +55,12 @@ fn make_simd<S: Simd>(
         let triangles = Triangles::new(simd, blocks, draw, meshlet, vertices);
         samples.put_down(&blocks[..left.min(LANES)]);
         left = left.saturating_sub(LANES);
-        let NewFragments { samples: new_samples, keys, primitives } = fragments.add(samples.count, LANES);
+        let NewFragments { samples: new_samples, keys, triangles: new_triangles } = fragments.add(samples.count, LANES);
         let numbers = samples.numbers[..samples.count.next_multiple_of(LANES)].as_chunks().0;
         let (new_samples, keys) = (new_samples.as_chunks_mut().0, keys.as_chunks_mut().0);
-        let room = new_samples.iter_mut().zip(keys).zip(primitives.as_chunks_mut().0);
-        for (numbers, ((samples, keys), primitives)) in numbers.iter().zip(room) {
-            triangles.make_fragments(simd, numbers, samples, keys, primitives);
+        let room = new_samples.iter_mut().zip(keys).zip(new_triangles.as_chunks_mut().0);
+        for (numbers, ((samples, keys), new_triangles)) in numbers.iter().zip(room) {
+            triangles.make_fragments(simd, numbers, samples, keys, new_triangles);
         }
     }
 }
@@ -79,7 +79,8 @@ struct Triangles<S: Simd> {
     normal: Option<[Plane<f32x8<S>>; 3]>,
     /// ... and so is the brightness.
     steady_light: f32x8<S>,
-    primitive: u32x8<S>,
+    /// Number of the triangle in the meshlet.
+    number: u32x8<S>,
 }
 
 /// What grows by the same from pixel to pixel.
@@ -140,7 +141,7 @@ impl<S: Simd> Triangles<S> {
             greatest_depth: a_z.max(b_z).max(c_z),
             normal,
             steady_light,
-            primitive: numbers + (meshlet.first_triangle as u32 + draw.first_primitive),
+            number: numbers,
         }
     }
 
@@ -152,7 +153,7 @@ impl<S: Simd> Triangles<S> {
         numbers: &[u16; LANES],
         samples: &mut [u16; LANES],
         keys: &mut [u64; LANES],
-        primitives: &mut [u32; LANES],
+        triangles: &mut [u16; LANES],
     ) {
         let (low, high) = u16x8::load_array_ref(simd, numbers).widen();
         let numbers: u32x8<S> = low.combine(high);
@@ -178,7 +179,8 @@ impl<S: Simd> Triangles<S> {
             }
         };
         lit_key::pack(depth, light, keys);
-        lookup.words(self.primitive).store_slice(primitives);
+        let (low, high) = lookup.words(self.number).split();
+        low.narrow(high).store_slice(triangles);
     }
 }
 

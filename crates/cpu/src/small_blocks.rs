@@ -174,12 +174,12 @@ impl SmallBlocks {
         }
     }
 
-    /// Sorts those of a draw by tile, keeping draw order, and tells how many fragments each tile gets.
-    pub(crate) fn sort_by_tile(&mut self, draw: u32, fragments: &mut SmallFragments) {
+    /// Sorts those of a draw's meshlet by tile, keeping draw order, and tells how many fragments each tile gets.
+    pub(crate) fn sort_by_tile(&mut self, draw_and_primitive: [u32; 2], fragments: &mut SmallFragments) {
         let mut sum = 0;
         for &tile in &self.tiles {
             let in_tile = &mut self.in_tiles[tile as usize];
-            fragments.add_run(tile, *in_tile as u32, draw);
+            fragments.add_run(tile, *in_tile as u32, draw_and_primitive);
             sum += std::mem::replace(in_tile, sum) / BLOCK;
         }
         let room = self.count.next_multiple_of(LANES);

@@ -9,7 +9,8 @@ pub(crate) struct SmallFragments {
     samples: Vec<u16>,
     /// Depth and brightness, see [`lit_key`](crate::lit_key); without rank.
     keys: Vec<u64>,
-    primitives: Vec<u32>,
+    /// Numbers of their triangles among those of the meshlet.
+    triangles: Vec<u16>,
     /// How many there are; beyond is room.
     count: usize,
     /// All of them, one run after the other.
@@ -26,8 +27,9 @@ pub(crate) struct Run {
     /// Number of the first among those of the chunk.
     pub(crate) first: u32,
     pub(crate) count: u32,
-    /// Number of the draw.
+    /// Number of the draw, and the primitive that the meshlet's first triangle is.
     pub(crate) draw: u32,
+    pub(crate) first_primitive: u32,
 }
 
 /// Some fragments of a draw.
@@ -35,19 +37,28 @@ pub(crate) struct Run {
 pub(crate) struct RunFragments<'a> {
     pub(crate) samples: &'a [u16],
     pub(crate) keys: &'a [u64],
-    pub(crate) primitives: &'a [u32],
+    pub(crate) triangles: &'a [u16],
     pub(crate) draw: u32,
+    pub(crate) first_primitive: u32,
 }
 
 /// Room for fragments.
 pub(crate) struct NewFragments<'a> {
     pub(crate) samples: &'a mut [u16],
     pub(crate) keys: &'a mut [u64],
-    pub(crate) primitives: &'a mut [u32],
+    pub(crate) triangles: &'a mut [u16],
 }
 
 /// Bytes of a fragment.
-const FRAGMENT_BYTES: usize = 14;
+const FRAGMENT_BYTES: usize = 12;
+
+impl RunFragments<'_> {
+    /// The primitive of one of them.
+    #[inline(always)]
+    pub(crate) fn primitive(&self, place: usize) -> u32 {
+        self.first_primitive + u32::from(self.triangles[place])
+    }
+}
 
 impl SmallFragments {
     /// Forgets all.
@@ -56,10 +67,10 @@ impl SmallFragments {
         self.runs.clear();
     }
 
-    /// Tells of fragments to be added: of a draw's, how many in a tile.
-    pub(crate) fn add_run(&mut self, tile: u32, count: u32, draw: u32) {
+    /// Tells of fragments to be added: of a draw and of a meshlet, how many in a tile.
+    pub(crate) fn add_run(&mut self, tile: u32, count: u32, [draw, first_primitive]: [u32; 2]) {
         let first = self.runs.last().map_or(0, |run| run.first + run.count);
-        self.runs.push(Run { tile, first, count, draw });
+        self.runs.push(Run { tile, first, count, draw, first_primitive });
     }
 
     /// Adds so many, to be written, and room for `beyond` more that may be.
@@ -74,7 +85,7 @@ impl SmallFragments {
         NewFragments {
             samples: &mut self.samples[first..end],
             keys: &mut self.keys[first..end],
-            primitives: &mut self.primitives[first..end],
+            triangles: &mut self.triangles[first..end],
         }
     }
 
@@ -83,7 +94,7 @@ impl SmallFragments {
         let room = (end + end / 4).max(1024);
         resize(&mut self.samples, room);
         resize(&mut self.keys, room);
-        resize(&mut self.primitives, room);
+        resize(&mut self.triangles, room);
     }
 
     /// Sorts runs by tile, keeping draw order.
@@ -159,7 +170,10 @@ impl<'a> TileRuns<'a> {
         let (first, end) = ((run.first + self.begun) as usize, (run.first + run.count) as usize);
         let count = match primitive {
             None => end - first,
-            Some(primitive) => self.all.primitives[first..end].iter().take_while(|&&other| other < primitive).count(),
+            Some(primitive) => {
+                let is_before = |triangle: &&u16| run.first_primitive + u32::from(**triangle) < primitive;
+                self.all.triangles[first..end].iter().take_while(is_before).count()
+            }
         };
         if count == 0 {
             return None;
@@ -173,8 +187,9 @@ impl<'a> TileRuns<'a> {
         Some(RunFragments {
             samples: &self.all.samples[range.clone()],
             keys: &self.all.keys[range.clone()],
-            primitives: &self.all.primitives[range],
+            triangles: &self.all.triangles[range],
             draw: run.draw,
+            first_primitive: run.first_primitive,
         })
     }
 }

@@ -120,14 +120,15 @@ pub(crate) struct FrameParts<'a> {
     pub(crate) palette: &'a [Vec4],
     /// Nothing that is drawn has more of a channel than this.
     pub(crate) greatest_color: Vec3,
-    /// Whether fragments are wanted for their colours alone.
-    pub(crate) blends: bool,
     pub(crate) grid: &'a TileGrid,
     pub(crate) level: Level,
 }
 
 /// Fragments that a capture is meant to have at most: more leave the second-level cache.
 const MOST_FRAGMENTS: u64 = 1 << 16;
+
+/// Those that a tile of one source is meant to have, of which nothing is kept but keys.
+const MOST_LIT_FRAGMENTS: u64 = 1 << 17;
 
 /// Fewest rows of a band: what it takes to set up a triangle again in each is shared by few fragments then.
 const FEWEST_ROWS: u32 = 2;
@@ -138,20 +139,21 @@ const RECORDS_FOR_A_GUESS: usize = 8;
 impl FrameParts<'_> {
     /// Rows of the bands into which a tile of so many records and small fragments is cut, so that each has few enough
     /// fragments. So a tile's memory does not grow with depth complexity either, up to thousands.
-    pub(crate) fn band_rows(&self, number: u32, records: u64, small: u64) -> u32 {
+    pub(crate) fn band_rows(&self, number: u32, records: u64, small: u64, lit_source: Option<u32>) -> u32 {
+        let most = if lit_source.is_some() { MOST_LIT_FRAGMENTS } else { MOST_FRAGMENTS };
         let mut fragments = small;
-        if small + records * TILE_SAMPLES as u64 > MOST_FRAGMENTS {
+        if small + records * TILE_SAMPLES as u64 > most {
             fragments += self.guess_fragments(number);
         }
         let mut rows = TILE_PX;
-        while fragments > MOST_FRAGMENTS && rows > FEWEST_ROWS {
+        while fragments > most && rows > FEWEST_ROWS {
             (rows, fragments) = (rows / 2, fragments / 2);
         }
         rows
     }
 
     /// The source of all fragments of a tile, if there are only those of small transparent triangles of one draw.
-    fn only_source(&self, number: u32) -> Option<u32> {
+    pub(crate) fn only_source(&self, number: u32) -> Option<u32> {
         for chunk in self.chunks {
             let others = [&chunk.opaque, &chunk.transparent].map(|bins| bins.records.tile(number));
             if others != [&[]; 2] || !chunk.opaque.small.tile(number).is_empty() {
@@ -189,8 +191,15 @@ impl FrameParts<'_> {
 }
 
 impl TileCapture {
-    /// Captures a band of a tile: `rows` of its rows from row `first` on.
-    pub(crate) fn capture(&mut self, number: u32, [first, rows]: [u32; 2], frame: FrameParts<'_>) {
+    /// Captures a band of a tile: `rows` of its rows from row `first` on. `lit_source`: the tile's only source, if fragments are
+    /// wanted for their colours alone.
+    pub(crate) fn capture(
+        &mut self,
+        number: u32,
+        [first, rows]: [u32; 2],
+        lit_source: Option<u32>,
+        frame: FrameParts<'_>,
+    ) {
         let tile = frame.grid.tile(number);
         self.rect = PixelRect {
             top: tile.top + first as i32,
@@ -205,7 +214,7 @@ impl TileCapture {
             self.opaque_depths.fill(0.0);
             self.has_opaque = false;
         }
-        self.lit_source = if frame.blends { frame.only_source(number) } else { None };
+        self.lit_source = lit_source;
         if self.lit_source.is_none() {
             self.capture_all(frame);
         }
@@ -246,7 +255,7 @@ impl TileCapture {
             while let Some(run) = small.next_before(None) {
                 for (i, &sample) in run.samples.iter().enumerate() {
                     let Some(sample) = band.sample(sample) else { continue };
-                    let key = order_key(lit_key::depth(run.keys[i]), run.primitives[i]);
+                    let key = order_key(lit_key::depth(run.keys[i]), run.primitive(i));
                     if key >= self.opaque_keys[sample] {
                         self.put_opaque(sample, key, lit_key::light(run.keys[i]), run.draw + 1);
                     }
