@@ -2,58 +2,51 @@
 
 use fearless_simd::{Bytes, Simd, SimdBase, SimdMask, f64x8, u64x8};
 
-use crate::order::Row;
+use crate::order::{Row, STRIP};
 
 /// Rows that a network sorts in registers.
 pub(crate) const BLOCK: usize = 8;
 
-/// Sorts every column of `rows`, greatest first: blocks by networks, which are then merged.
+/// Rows that have to be there for so many to be sorted: those beyond are 0.
+pub(crate) fn padded(count: usize) -> usize {
+    if count > BLOCK { count.next_multiple_of(BLOCK) } else { count }
+}
+
+/// Sorts every column of the first `count` rows, greatest first: blocks by networks, which are then merged. There are as many
+/// rows as [`padded`] tells.
 #[inline(always)]
-pub(crate) fn sort_rows<S: Simd>(simd: S, rows: &mut [Row], last: &mut Permutation) {
-    if rows.len() > BLOCK {
-        if falls(simd, rows) {
-            return;
-        }
-        if rises(simd, rows) {
-            rows.reverse();
-            return;
-        }
+pub(crate) fn sort_rows<S: Simd>(simd: S, padded: &mut [Row], count: usize, last: &mut Permutation) {
+    if count <= BLOCK {
+        return sort_few(simd, bytemuck::cast_slice_mut(padded));
     }
-    let many = rows.len() > Permutation::FEWEST_ROWS;
-    if many && last.apply(simd, rows) {
+    let rows = &mut padded[..count];
+    if falls(simd, rows) {
         return;
     }
-    if many {
-        last.before(rows);
+    if rises(simd, rows) {
+        rows.reverse();
+        return;
     }
-    for block in rows.chunks_mut(BLOCK) {
-        match block.len() {
-            0 | 1 => {}
-            2 => sort_2(simd, block),
-            3 | 4 => sort_4(simd, block),
-            _ => sort_8(simd, block),
-        }
+    if last.apply(simd, rows) {
+        return;
     }
-    let mut sorted = BLOCK;
-    while sorted < rows.len() {
-        for pair in rows.chunks_mut(2 * sorted).filter(|pair| pair.len() > sorted) {
-            merge(simd, pair, sorted);
-        }
-        sorted *= 2;
-    }
-    if many {
-        last.after(rows);
-    }
+    last.before(rows);
+    sort_many(simd, bytemuck::cast_slice_mut(padded));
+    last.after(&padded[..count]);
+}
+
+/// The keys of a row as numbers of the same order.
+type Keys = [f64; STRIP];
+
+/// As many keys of a row as the level has in a vector: so more rows fit into registers.
+#[inline(always)]
+fn load<S: Simd>(simd: S, keys: &Keys, part: usize) -> S::f64s {
+    S::f64s::from_slice(simd, &keys[part..part + S::f64s::LEN])
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, row: &Row) -> f64x8<S> {
-    u64x8::load_array_ref(simd, &row.0).bitcast()
-}
-
-#[inline(always)]
-fn store<S: Simd>(keys: f64x8<S>, row: &mut Row) {
-    keys.bitcast::<u64x8<S>>().store_array(&mut row.0);
+fn store<S: Simd>(values: S::f64s, keys: &mut Keys, part: usize) {
+    values.store_slice(&mut keys[part..part + S::f64s::LEN]);
 }
 
 /// Puts the greater of each two first, in registers.
@@ -66,36 +59,116 @@ macro_rules! compare {
     };
 }
 
-/// Sorts up to so many rows in registers by Batcher's odd-even merge sort (1968).
+/// Sorts so many rows in registers.
 macro_rules! network {
     ($name:ident, $count:literal, $($near:literal $far:literal),*) => {
         #[inline(always)]
-        fn $name<S: Simd>(simd: S, rows: &mut [Row]) {
-            let mut sorted = [f64x8::splat(simd, 0.0); $count];
-            for (keys, row) in sorted.iter_mut().zip(rows.iter()) {
-                *keys = load(simd, row);
-            }
-            compare!(sorted, $($near $far),*);
-            for (row, keys) in rows.iter_mut().zip(sorted) {
-                store(keys, row);
+        fn $name<S: Simd>(simd: S, rows: &mut [Keys; $count]) {
+            for part in (0..STRIP).step_by(S::f64s::LEN) {
+                let mut sorted = [S::f64s::splat(simd, 0.0); $count];
+                for (keys, row) in sorted.iter_mut().zip(rows.iter()) {
+                    *keys = load(simd, row, part);
+                }
+                compare!(sorted, $($near $far),*);
+                for (row, keys) in rows.iter_mut().zip(sorted) {
+                    store::<S>(keys, row, part);
+                }
             }
         }
     };
 }
 
+// As few comparisons as are known to do; of 2, 4 and 8 rows Batcher's odd-even merge sort (1968).
 network!(sort_2, 2, 0 1);
+network!(sort_3, 3, 0 2, 0 1, 1 2);
 network!(sort_4, 4, 0 1, 2 3, 0 2, 1 3, 1 2);
+network!(sort_5, 5, 0 3, 1 4, 0 2, 1 3, 0 1, 2 4, 1 2, 3 4, 2 3);
+network!(sort_6, 6, 0 5, 1 3, 2 4, 1 2, 3 4, 0 3, 2 5, 0 1, 2 3, 4 5, 1 2, 3 4);
+network!(sort_7, 7, 0 6, 2 3, 4 5, 0 2, 1 4, 3 6, 0 1, 2 5, 3 4, 1 2, 4 6, 2 3, 4 5, 1 2, 3 4, 5 6);
 network!(
     sort_8,
     8,
     0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6
 );
 
-/// Merges `sorted` sorted rows, a power of two, with the sorted rest: Batcher's bitonic merge, of which the first step
-/// compares from both ends, so that the greater key always moves to the front, and rows that are not there behave like 0.
-/// Three steps at a time are done in registers; the odd-even merge has fewer comparisons, but they fall into no such blocks.
+/// The last three steps of Batcher's bitonic merge.
+macro_rules! clean_in_registers {
+    ($keys:ident) => {
+        compare!($keys, 0 4, 1 5, 2 6, 3 7, 0 2, 1 3, 4 6, 5 7, 0 1, 2 3, 4 5, 6 7)
+    };
+}
+
+network!(clean, 8, 0 4, 1 5, 2 6, 3 7, 0 2, 1 3, 4 6, 5 7, 0 1, 2 3, 4 5, 6 7);
+
+/// Sorts up to a block of rows.
 #[inline(always)]
-fn merge<S: Simd>(simd: S, rows: &mut [Row], sorted: usize) {
+fn sort_few<S: Simd>(simd: S, rows: &mut [Keys]) {
+    macro_rules! sort {
+        ($network:ident) => {
+            if let Ok(rows) = rows.try_into() {
+                $network(simd, rows);
+            }
+        };
+    }
+    match rows.len() {
+        2 => sort!(sort_2),
+        3 => sort!(sort_3),
+        4 => sort!(sort_4),
+        5 => sort!(sort_5),
+        6 => sort!(sort_6),
+        7 => sort!(sort_7),
+        _ => sort!(sort_8),
+    }
+}
+
+/// Sorts whole blocks of rows.
+#[inline(always)]
+fn sort_many<S: Simd>(simd: S, rows: &mut [Keys]) {
+    for block in rows.as_chunks_mut().0 {
+        sort_8(simd, block);
+    }
+    for pair in rows.as_chunks_mut().0 {
+        merge_blocks(simd, pair);
+    }
+    let mut sorted = 2 * BLOCK;
+    while sorted < rows.len() {
+        for pair in rows.chunks_mut(2 * sorted).filter(|pair| pair.len() > sorted) {
+            merge(simd, pair, sorted);
+        }
+        sorted *= 2;
+    }
+}
+
+/// Merges two sorted blocks, as [`merge`] does, in registers.
+#[inline(always)]
+fn merge_blocks<S: Simd>(simd: S, rows: &mut [Keys; 2 * BLOCK]) {
+    for part in (0..STRIP).step_by(S::f64s::LEN) {
+        let mut keys = [S::f64s::splat(simd, 0.0); BLOCK];
+        for (i, keys) in keys.iter_mut().enumerate() {
+            let (near, far) = (load(simd, &rows[i], part), load(simd, &rows[2 * BLOCK - 1 - i], part));
+            *keys = near.max(far);
+            store::<S>(near.min(far), &mut rows[2 * BLOCK - 1 - i], part);
+        }
+        clean_in_registers!(keys);
+        for (row, keys) in rows.iter_mut().zip(keys) {
+            store::<S>(keys, row, part);
+        }
+        for (keys, row) in keys.iter_mut().zip(&rows[BLOCK..]) {
+            *keys = load(simd, row, part);
+        }
+        clean_in_registers!(keys);
+        for (row, keys) in rows[BLOCK..].iter_mut().zip(keys) {
+            store::<S>(keys, row, part);
+        }
+    }
+}
+
+/// Merges `sorted` sorted rows, a power of two, with the sorted rest, all of whole blocks: Batcher's bitonic merge, of which the
+/// first step compares from both ends, so that the greater key always moves to the front, and rows that are not there
+/// behave like 0. Three steps at a time are done in registers; the odd-even merge has fewer comparisons, but they fall into
+/// no such blocks.
+#[inline(always)]
+fn merge<S: Simd>(simd: S, rows: &mut [Keys], sorted: usize) {
     let (near, far) = rows.split_at_mut(sorted);
     let first = sorted - far.len();
     for (near, far) in near[first..].iter_mut().zip(far.iter_mut().rev()) {
@@ -113,36 +186,43 @@ fn merge<S: Simd>(simd: S, rows: &mut [Row], sorted: usize) {
         step /= 2;
     }
     // The rest is a multiple of three steps.
-    while step >= 1 {
+    while step > BLOCK / 2 {
         let stride = step / 4;
         for block in rows.chunks_mut(2 * step) {
             for i in 0..stride.min(block.len()) {
-                clean(simd, &mut block[i..], stride);
+                clean_far(simd, &mut block[i..], stride);
             }
         }
         step /= 8;
     }
+    for block in rows.as_chunks_mut().0 {
+        clean(simd, block);
+    }
 }
 
-/// The steps of 4, 2 and 1 between the first eight rows of those that are `stride` apart.
+/// As [`clean`], of up to eight rows that are `stride` apart.
 #[inline(always)]
-fn clean<S: Simd>(simd: S, rows: &mut [Row], stride: usize) {
-    let mut keys = [f64x8::splat(simd, 0.0); 8];
-    for (keys, row) in keys.iter_mut().zip(rows.iter().step_by(stride)) {
-        *keys = load(simd, row);
-    }
-    compare!(keys, 0 4, 1 5, 2 6, 3 7, 0 2, 1 3, 4 6, 5 7, 0 1, 2 3, 4 5, 6 7);
-    for (keys, row) in keys.into_iter().zip(rows.iter_mut().step_by(stride)) {
-        store(keys, row);
+fn clean_far<S: Simd>(simd: S, rows: &mut [Keys], stride: usize) {
+    for part in (0..STRIP).step_by(S::f64s::LEN) {
+        let mut keys = [S::f64s::splat(simd, 0.0); BLOCK];
+        for (keys, row) in keys.iter_mut().zip(rows.iter().step_by(stride)) {
+            *keys = load(simd, row, part);
+        }
+        clean_in_registers!(keys);
+        for (keys, row) in keys.into_iter().zip(rows.iter_mut().step_by(stride)) {
+            store::<S>(keys, row, part);
+        }
     }
 }
 
 /// Compares and exchanges two rows.
 #[inline(always)]
-fn exchange<S: Simd>(simd: S, near: &mut Row, far: &mut Row) {
-    let (a, b) = (load(simd, near), load(simd, far));
-    store(a.max(b), near);
-    store(a.min(b), far);
+fn exchange<S: Simd>(simd: S, near: &mut Keys, far: &mut Keys) {
+    for part in (0..STRIP).step_by(S::f64s::LEN) {
+        let (a, b) = (load(simd, near, part), load(simd, far, part));
+        store::<S>(a.max(b), near, part);
+        store::<S>(a.min(b), far, part);
+    }
 }
 
 /// Some bits of a key.
@@ -175,9 +255,6 @@ pub(crate) struct Permutation {
 }
 
 impl Permutation {
-    /// Sorting fewer rows is as fast.
-    const FEWEST_ROWS: usize = BLOCK;
-
     /// Strips that may fail one after another before no more are tried in a tile.
     const MOST_FAILURES: u32 = 4;
 
@@ -201,7 +278,7 @@ impl Permutation {
         let mut last = f64x8::splat(simd, f64::INFINITY);
         for &from in &self.from {
             let row = rows[from as usize];
-            let keys = load(simd, &row);
+            let keys = load_row(simd, &row);
             if !keys.simd_le(last).all_true() {
                 self.failures += 1;
                 return false;
@@ -239,11 +316,17 @@ impl Permutation {
     }
 }
 
+/// The keys of a row as numbers of the same order.
+#[inline(always)]
+fn load_row<S: Simd>(simd: S, row: &Row) -> f64x8<S> {
+    u64x8::load_array_ref(simd, &row.0).bitcast()
+}
+
 /// Whether all columns fall, as those of surfaces drawn from front to back do.
 #[inline(always)]
 fn falls<S: Simd>(simd: S, rows: &[Row]) -> bool {
     for pair in rows.windows(2) {
-        if !load(simd, &pair[1]).simd_le(load(simd, &pair[0])).all_true() {
+        if !load_row(simd, &pair[1]).simd_le(load_row(simd, &pair[0])).all_true() {
             return false;
         }
     }
@@ -254,9 +337,60 @@ fn falls<S: Simd>(simd: S, rows: &[Row]) -> bool {
 #[inline(always)]
 fn rises<S: Simd>(simd: S, rows: &[Row]) -> bool {
     for pair in rows.windows(2) {
-        if !load(simd, &pair[1]).simd_ge(load(simd, &pair[0])).all_true() {
+        if !load_row(simd, &pair[1]).simd_ge(load_row(simd, &pair[0])).all_true() {
             return false;
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::simd::levels;
+
+    /// Sorts columns of so many rows, a key told by its row and column, and compares with what sorting each one gives.
+    fn check(level: Level, count: usize, key: impl Fn(usize, usize) -> u64) {
+        let mut rows = vec![Row::default(); padded(count)];
+        for (i, row) in rows[..count].iter_mut().enumerate() {
+            row.0 = std::array::from_fn(|column| key(i, column));
+        }
+        let mut expected: [Vec<u64>; STRIP] =
+            std::array::from_fn(|column| rows.iter().map(|row| row.0[column]).collect());
+        let mut last = Permutation::default();
+        last.begin(Bits { first: 0, count: 20 }, 1 << 20);
+        dispatch!(level, simd => sort_rows(simd, &mut rows, count, &mut last));
+        for (column, expected) in expected.iter_mut().enumerate() {
+            expected.sort_unstable_by(|a, b| b.cmp(a));
+            let sorted: Vec<u64> = rows.iter().map(|row| row.0[column]).collect();
+            assert_eq!(&sorted, expected, "column {column} of {count} rows");
+        }
+    }
+
+    /// A network that sorts all zeros and ones sorts everything (Knuth, volume 3, section 5.3.4).
+    #[test]
+    fn few_rows_of_zeros_and_ones_are_sorted() {
+        for (_, level) in levels() {
+            for count in 1..=BLOCK {
+                for first in (0..1 << count).step_by(STRIP) {
+                    check(level, count, |i, column| ((first + column) >> i & 1) as u64);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_any_number_are_sorted() {
+        for (_, level) in levels() {
+            for count in (1..200).chain([255, 256, 257, 511, 513, 600]) {
+                // Some columns are shorter than others.
+                check(level, count, |i, column| match i + column * count / 16 < count {
+                    true => ((i * 7919 + column * 31) as u64 * 2_654_435_761 % 1_000_003) << 20 | (i as u64 + 1),
+                    false => 0,
+                });
+            }
+        }
+    }
 }

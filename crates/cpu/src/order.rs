@@ -14,7 +14,7 @@ use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, i32x8, u32
 
 use crate::fragments::Fragments;
 use crate::lit_key;
-use crate::networks::{BLOCK, Bits, Permutation, sort_rows};
+use crate::networks::{BLOCK, Bits, Permutation, padded, sort_rows};
 use crate::simd::each_lane;
 use crate::small_fragments::RunFragments;
 use crate::tile::{Band, FragmentCounts, TILE_SAMPLES};
@@ -30,7 +30,8 @@ pub(crate) struct Order {
     counts: Vec<u32>,
     next: Vec<u32>,
     pub(crate) strips: Vec<Strip>,
-    /// Rows of all strips. Where a pixel has fewer fragments than its strip has rows, the last ones are 0.
+    /// Rows of all strips, and those that pad them. Where a pixel has fewer fragments than its strip has rows, the last ones
+    /// are 0.
     keys: Vec<Row>,
     /// How the last strip of many rows was brought into order.
     last: Permutation,
@@ -201,7 +202,7 @@ impl Order {
     fn sort_strips<S: Simd>(&mut self, simd: S) {
         for strip in &self.strips {
             let (first, count) = (strip.first_row as usize, strip.row_count as usize);
-            sort_rows(simd, &mut self.keys[first..first + count], &mut self.last);
+            sort_rows(simd, &mut self.keys[first..first + padded(count)], count, &mut self.last);
         }
     }
 
@@ -273,7 +274,7 @@ impl Order {
                 strip.row_count = strip.row_count.max(self.counts[sample as usize]);
                 self.next[sample as usize] = (row_count * STRIP + lane) as u32;
             }
-            row_count += strip.row_count as usize;
+            row_count += padded(strip.row_count as usize);
             self.strips.push(strip);
         }
         row_count
