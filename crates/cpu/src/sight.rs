@@ -87,7 +87,7 @@ impl Sight {
         let (x, y) = ((left << 8) + center(0), (top << 8) + center(0));
         let (a, b, c, first) = ([ax, ay], [bx, by], [cx, cy], [x, y]);
         let edges = [Edge::new(b, c, first), Edge::new(c, a, first), Edge::new(a, b, first)];
-        let mut any = zero;
+        let mut any = u32x8::splat(simd, 0);
         let mut row = edges;
         for down in (0..rows).step_by(BLOCK_PX as usize) {
             let mut block = row;
@@ -187,29 +187,54 @@ fn rows_mask(count: i32) -> u64 {
 
 /// The samples of a block that lie inside three edges: rows 0 to 3 and 4 to 7, a bit for each.
 #[inline(always)]
-fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> (i32x8<S>, i32x8<S>) {
+fn cover_block<S: Simd>(simd: S, edges: &[Edge<S>; 3], size: [i32; 2]) -> (u32x8<S>, u32x8<S>) {
     // Seen to be at most 8, loops would be unrolled, and multiples of steps that are hardly ever taken computed beforehand.
     let [columns, rows] = black_box(size);
-    let [a, b, c] = edges;
-    let zero = i32x8::splat(simd, 0);
-    let mut row = [a.value, b.value, c.value];
-    let mut halves = [zero; 2];
-    for (half, rows) in halves.iter_mut().zip([rows.min(BLOCK_PX / 2), rows - BLOCK_PX / 2]) {
-        let mut bits = i32x8::splat(simd, 1);
-        for _ in 0..rows {
-            let [mut a_here, mut b_here, mut c_here] = row;
-            let mut bit = bits;
-            for _ in 0..columns {
-                *half |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
-                bit <<= 1;
-                (a_here, b_here, c_here) = (a_here + a.right, b_here + b.right, c_here + c.right);
-            }
-            bits <<= BLOCK_PX as u32;
-            row = [row[0] + a.down, row[1] + b.down, row[2] + c.down];
-        }
+    let mut here = edges.map(|edge| edge.value);
+    let upper = cover_rows(simd, edges, &mut here, [columns, rows.min(BLOCK_PX / 2)]);
+    if rows <= BLOCK_PX / 2 {
+        return (upper, u32x8::splat(simd, 0));
     }
-    let [upper, lower] = halves;
-    (upper, lower)
+    (upper, cover_rows(simd, edges, &mut here, [columns, rows - BLOCK_PX / 2]))
+}
+
+/// Those of up to four rows, from the values that edges have at the first sample. To the right in one row, back in the next: so
+/// no values have to be kept but those here.
+#[inline(always)]
+fn cover_rows<S: Simd>(simd: S, edges: &[Edge<S>; 3], here: &mut [i32x8<S>; 3], [columns, rows]: [i32; 2]) -> u32x8<S> {
+    let [a, b, c] = edges;
+    let [mut a_here, mut b_here, mut c_here] = *here;
+    let zero = u32x8::splat(simd, 0);
+    let mut covered = zero;
+    let mut bit = u32x8::splat(simd, 1);
+    let mut rows_left = rows;
+    loop {
+        covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+        for _ in 1..columns {
+            (a_here, b_here, c_here) = (a_here + a.right, b_here + b.right, c_here + c.right);
+            bit <<= 1;
+            covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+        }
+        (a_here, b_here, c_here) = (a_here + a.down, b_here + b.down, c_here + c.down);
+        if rows_left == 1 {
+            break;
+        }
+        bit <<= BLOCK_PX as u32;
+        covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+        for _ in 1..columns {
+            (a_here, b_here, c_here) = (a_here - a.right, b_here - b.right, c_here - c.right);
+            bit >>= 1;
+            covered |= (a_here | b_here | c_here).simd_ge(0).select(bit, zero);
+        }
+        (a_here, b_here, c_here) = (a_here + a.down, b_here + b.down, c_here + c.down);
+        if rows_left == 2 {
+            break;
+        }
+        bit <<= BLOCK_PX as u32;
+        rows_left -= 2;
+    }
+    *here = [a_here, b_here, c_here];
+    covered
 }
 
 /// The first sample at or after a coordinate, from the window's first on.

@@ -49,12 +49,10 @@ fn make_simd<S: Simd>(
     vertices: &Vertices,
     fragments: &mut SmallFragments,
 ) {
-    let mut left = blocks.len();
     let (sorted, samples) = blocks.sorted();
     for blocks in sorted {
         let triangles = Triangles::new(simd, blocks, draw, meshlet, vertices);
-        samples.put_down(&blocks[..left.min(LANES)]);
-        left = left.saturating_sub(LANES);
+        samples.put_down(simd, blocks);
         let NewFragments { samples: new_samples, keys, triangles: new_triangles } = fragments.add(samples.count, LANES);
         let numbers = samples.numbers[..samples.count.next_multiple_of(LANES)].as_chunks().0;
         let (new_samples, keys) = (new_samples.as_chunks_mut().0, keys.as_chunks_mut().0);

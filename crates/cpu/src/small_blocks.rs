@@ -1,8 +1,10 @@
 //! Blocks of samples that small triangles cover, sorted by tile.
 
+use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, f32x8, i32x8, u32x8};
 use pellucid_core::meshlets::LANES;
 
 use crate::bin::{TILE_PX, TileGrid};
+use crate::simd::{each_lane, unzip};
 use crate::small_fragments::SmallFragments;
 
 /// Side of a block of samples.
@@ -51,7 +53,7 @@ pub(crate) struct SmallBlocks {
     /// For each tile of the window how many fragments there are, and blocks times [`BLOCK`]; while they are sorted, where
     /// its next block goes.
     in_tiles: Vec<u64>,
-    /// Tile by tile, each tile's in draw order; filled up to a multiple of eight with any of them.
+    /// Tile by tile, each tile's in draw order; filled up to a multiple of eight with any that covers nothing.
     sorted: Vec<SmallBlock>,
     /// What eight of them cover.
     samples: Samples,
@@ -192,19 +194,15 @@ impl SmallBlocks {
             *next += 1;
         }
         if let Some(&any) = self.blocks[..self.count].last() {
-            self.sorted[self.count..room].fill(any);
+            self.sorted[self.count..room].fill(SmallBlock { covered: 0, ..any });
         }
     }
 
-    /// What was sorted, eight at a time, and room for samples of eight. Beyond the last, any of them.
+    /// What was sorted, eight at a time, and room for samples of eight. Those beyond the last cover nothing.
     #[inline(always)]
     pub(crate) fn sorted(&mut self) -> (&[[SmallBlock; LANES]], &mut Samples) {
         let room = self.count.next_multiple_of(LANES);
         (self.sorted[..room].as_chunks().0, &mut self.samples)
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.count
     }
 
     /// Bytes held.
@@ -229,29 +227,82 @@ impl Default for Samples {
     }
 }
 
-/// Samples of a block that are put down without asking whether there are as many: what asks is often mispredicted.
-const WITHOUT_ASKING: usize = 4;
+/// Samples of each block that are found side by side.
+const SIDE_BY_SIDE: usize = 4;
 
 impl Samples {
-    /// Puts down which samples are covered.
+    /// Puts down which samples eight blocks cover.
     #[inline(always)]
-    pub(crate) fn put_down(&mut self, blocks: &[SmallBlock]) {
+    pub(crate) fn put_down<S: Simd>(&mut self, simd: S, blocks: &[SmallBlock; LANES]) {
+        let first = first_samples(simd, blocks);
         let mut end = 0;
-        for (lane, SmallBlock { covered, .. }) in blocks.iter().enumerate() {
-            let lane = (lane << BLOCK_BITS) as u16;
-            let mut bits = *covered;
-            let mut at = end;
-            for number in &mut self.numbers[at..at + WITHOUT_ASKING] {
-                *number = lane | bits.trailing_zeros() as u16;
-                bits &= bits.wrapping_sub(1);
+        for lane in 0..LANES {
+            let covered = blocks[lane].covered;
+            let count = covered.count_ones() as usize;
+            self.numbers[end..end + SIDE_BY_SIDE].copy_from_slice(&first[lane]);
+            if count > SIDE_BY_SIDE {
+                self.put_down_rest(lane, covered, end + SIDE_BY_SIDE);
             }
-            while bits != 0 {
-                self.numbers[at + WITHOUT_ASKING] = lane | bits.trailing_zeros() as u16;
-                bits &= bits - 1;
-                at += 1;
-            }
-            end += covered.count_ones() as usize;
+            end += count;
         }
         self.count = end;
     }
+
+    /// Puts down all but the first four samples of a block.
+    #[inline(never)]
+    fn put_down_rest(&mut self, lane: usize, covered: u64, mut end: usize) {
+        let lane = (lane << BLOCK_BITS) as u16;
+        let mut bits = covered;
+        for _ in 0..SIDE_BY_SIDE {
+            bits &= bits - 1;
+        }
+        while bits != 0 {
+            self.numbers[end] = lane | bits.trailing_zeros() as u16;
+            bits &= bits - 1;
+            end += 1;
+        }
+    }
+}
+
+/// The first four samples that each of eight blocks covers, as [`Samples`] has them; anything beyond the last.
+#[inline(always)]
+fn first_samples<S: Simd>(simd: S, blocks: &[SmallBlock; LANES]) -> [[u16; SIDE_BY_SIDE]; LANES] {
+    let halves = each_lane(|lane| [blocks[lane].covered as u32, (blocks[lane].covered >> 32) as u32]);
+    let [mut upper, mut lower]: [u32x8<S>; 2] = unzip(simd, halves);
+    let zero = u32x8::splat(simd, 0);
+    let mut numbers = [zero; SIDE_BY_SIDE];
+    if lower.simd_eq(zero).all_true() {
+        for number in &mut numbers {
+            let first = upper & (zero - upper);
+            *number = exponent(first);
+            upper ^= first;
+        }
+    } else {
+        for number in &mut numbers {
+            let is_lower = upper.simd_eq(zero);
+            let bits = is_lower.select(lower, upper);
+            let first = bits & (zero - bits);
+            *number = exponent(first) | is_lower.select(u32x8::splat(simd, 32), zero);
+            upper ^= is_lower.select(zero, first);
+            lower ^= is_lower.select(first, zero);
+        }
+    }
+    let lanes = u32x8::load_array(simd, each_lane(|lane| (lane << BLOCK_BITS) as u32 * 0x1_0001));
+    let [a, b, c, d] = numbers;
+    let pairs = if cfg!(target_endian = "little") { [[a, b], [c, d]] } else { [[b, a], [d, c]] };
+    let [ab, cd] = pairs.map(|[low, high]| (low | (high << 16)) | lanes);
+    let (first, last) = ab.interleave(cd);
+    let mut all = [[0; SIDE_BY_SIDE]; LANES];
+    let (first_half, last_half) = bytemuck::cast_slice_mut::<_, u32>(&mut all).split_at_mut(LANES);
+    first.store_slice(first_half);
+    last.store_slice(last_half);
+    all
+}
+
+/// The number of the only bit that is set; anything below 32 if none is.
+#[inline(always)]
+fn exponent<S: Simd>(bit: u32x8<S>) -> u32x8<S> {
+    // From 127 on; the highest bit is taken for a sign, which falls away.
+    let float: f32x8<S> = bit.bitcast::<i32x8<S>>().to_float();
+    ((float.bitcast::<u32x8<S>>() >> 23) + 1) & 31
 }
