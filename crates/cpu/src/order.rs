@@ -25,8 +25,8 @@ pub(crate) const STRIP: usize = 8;
 /// The order of a tile's fragments.
 #[derive(Debug)]
 pub(crate) struct Order {
-    /// How many fragments each sample has, and where its first key stands, then that beyond its last; each one stands
-    /// [`STRIP`] further.
+    /// How many fragments each sample has, if there are strips, and where its first key stands, then that beyond its last;
+    /// each one stands [`STRIP`] further.
     counts: Vec<u32>,
     next: Vec<u32>,
     pub(crate) strips: Vec<Strip>,
@@ -141,14 +141,19 @@ fn cleared(rows: &mut Vec<Row>, count: usize) -> &mut [Row] {
 }
 
 impl Order {
+    /// The order of no fragments.
+    pub(crate) fn clear(&mut self) {
+        self.strips.clear();
+    }
+
     /// Orders the fragments of a tile.
     pub(crate) fn sort(&mut self, level: Level, fragments: &Fragments) -> FragmentCounts {
         let mut totals = FragmentCounts::default();
-        self.strips.clear();
-        self.counts.fill(0);
+        self.clear();
         if fragments.len() == 0 {
             return totals;
         }
+        self.counts.fill(0);
         let (samples, depths) = fragments.samples_and_depths();
         let counts = of_samples(&mut self.counts);
         for &sample in &samples[1..] {
@@ -170,10 +175,7 @@ impl Order {
         band: Band,
     ) -> Option<FragmentCounts> {
         let mut totals = FragmentCounts::default();
-        self.strips.clear();
-        if runs.clone().next().is_none() {
-            return Some(totals);
-        }
+        self.clear();
         self.counts.fill(0);
         let counts = of_samples(&mut self.counts);
         let count = if band.is_whole_tile() { count::<false> } else { count::<true> };
@@ -288,8 +290,9 @@ impl Order {
 
     /// The numbers of a sample's fragments, nearest first.
     pub(crate) fn of_sample(&self, sample: usize) -> impl Iterator<Item = u32> {
+        let count = if self.strips.is_empty() { 0 } else { self.counts[sample] as usize };
         // A sample without fragments has no first one.
-        let (next, count) = (self.next[sample] as usize, self.counts[sample] as usize);
+        let next = self.next[sample] as usize;
         let (first, lane) = ((next / STRIP).saturating_sub(count), next % STRIP);
         self.keys.iter().skip(first).take(count).map(move |row| row.0[lane] as u32)
     }

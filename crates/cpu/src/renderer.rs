@@ -394,9 +394,15 @@ impl<'a> Run<'a> {
             let mut counts = FragmentCounts::default();
             let mut times = [Duration::ZERO; 3];
             while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let (records, small) = (records[tile as usize], small[tile as usize]);
+                if records == 0 && small == 0 {
+                    worker.capture.capture_nothing(tile, frame);
+                    resolve(frame, &worker.capture, &mut worker.buffers);
+                    continue;
+                }
                 let mut started = Instant::now();
-                let lit_source = if blends { frame.only_source(tile) } else { None };
-                let rows = frame.band_rows(tile, records[tile as usize], small[tile as usize], lit_source);
+                let lit_source = if blends && records == 0 { frame.only_source(tile) } else { None };
+                let rows = frame.band_rows(tile, records, small, lit_source);
                 for first in (0..grid.tile_rows(tile)).step_by(rows as usize) {
                     worker.capture.capture(tile, [first, rows], lit_source, frame);
                     let captured = Instant::now();

@@ -152,13 +152,10 @@ impl FrameParts<'_> {
         rows
     }
 
-    /// The source of all fragments of a tile, if there are only those of small transparent triangles of one draw.
+    /// The source of all fragments of a tile without records, if there are only those of transparent triangles of one draw.
     pub(crate) fn only_source(&self, number: u32) -> Option<u32> {
-        for chunk in self.chunks {
-            let others = [&chunk.opaque, &chunk.transparent].map(|bins| bins.records.tile(number));
-            if others != [&[]; 2] || !chunk.opaque.small.tile(number).is_empty() {
-                return None;
-            }
+        if self.chunks.iter().any(|chunk| !chunk.opaque.small.tile(number).is_empty()) {
+            return None;
         }
         let mut runs = self.small_transparent(number);
         let draw = runs.next().map_or(0, |run| run.draw);
@@ -206,17 +203,30 @@ impl TileCapture {
             bottom: tile.bottom.min(tile.top + (first + rows) as i32 - 1),
             ..tile
         };
+        self.forget_opaque();
         self.number = number;
         self.band = Band { first: first * TILE_PX, count: rows * TILE_PX };
+        self.lit_source = lit_source;
+        if self.lit_source.is_none() {
+            self.capture_all(frame);
+        }
+    }
+
+    /// Captures a tile in which nothing is.
+    pub(crate) fn capture_nothing(&mut self, number: u32, frame: FrameParts<'_>) {
+        self.rect = frame.grid.tile(number);
+        self.forget_opaque();
+        self.fragments.clear();
+        self.order.clear();
+        self.lit_source = None;
+    }
+
+    fn forget_opaque(&mut self) {
         if self.has_opaque {
             self.opaque_keys.fill(0);
             self.opaque_sources.fill(0);
             self.opaque_depths.fill(0.0);
             self.has_opaque = false;
-        }
-        self.lit_source = lit_source;
-        if self.lit_source.is_none() {
-            self.capture_all(frame);
         }
     }
 
