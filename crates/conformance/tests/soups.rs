@@ -3,7 +3,7 @@
 use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::meshlets::MESHLET_TRIANGLES;
 use pellucid::core::oracle;
-use pellucid::{Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, View};
+use pellucid::{Camera, Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, View};
 use pellucid_conformance::{images, layers};
 use proptest::prelude::*;
 
@@ -55,6 +55,59 @@ fn meshes_of_any_size_side_by_side_equal_the_oracle() {
     }
     let view = View::of(&scene).size(75, 61);
     assert_equals_oracle(&Renderer::new(), &scene, &view);
+}
+
+/// A scene of one mesh, in one colour, of triangles that are lit each in its own way.
+fn one_mesh(triangles: impl Iterator<Item = [Vec3; 3]>, alpha: f32) -> Scene {
+    let positions: Vec<Vec3> = triangles.flatten().collect();
+    let turned = |i: usize| Vec3::new((i as f32 * 0.7).sin(), 0.0, (i as f32 * 0.7).cos());
+    let normals = (0..positions.len()).map(|vertex| turned(vertex / 3)).collect();
+    let numbers = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mut scene = Scene::new();
+    let mesh = scene.add_mesh(Mesh::new(positions, numbers).unwrap().with_normals(normals).unwrap()).unwrap();
+    let material = scene.add_material(Material::translucent("lit", Vec4::new(0.9, 0.6, 0.3, alpha))).unwrap();
+    scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+    scene
+}
+
+fn facing(scene: &Scene, width: u32, height: u32, distance: f32) -> View {
+    let mut view = View::of(scene).size(width, height);
+    view.camera = Camera { eye: Vec3::Z * distance, target: Vec3::ZERO, ..view.camera };
+    view
+}
+
+/// Small triangles on each other at five depths only, in four tiles: draw order decides nearly everywhere. More than 255 at
+/// a pixel have no place for it in keys that carry their light.
+#[test]
+fn level_small_triangles_equal_the_oracle_however_many() {
+    for count in [2, 9, 40, 255, 256, 700] {
+        let triangle = |i: usize| {
+            let (shift, depth) = ((i % 3) as f32 * 0.02, (i * 7 % 5) as f32 * 0.1);
+            [[-0.1, -0.12], [0.13, -0.08], [0.0, 0.12]].map(|[x, y]: [f32; 2]| Vec3::new(x + shift, y, depth))
+        };
+        let scene = one_mesh((0..count).map(triangle), 0.1);
+        let capture = assert_equals_oracle(&Renderer::new(), &scene, &facing(&scene, 64, 64, 4.0));
+        let greatest = (0..64 * 64).map(|pixel| capture.layers.pixel(pixel % 64, pixel / 64).len()).max();
+        assert_eq!(greatest, Some(count));
+    }
+}
+
+/// 160 layers of small triangles in one tile: more fragments of one colour than are captured at once.
+#[test]
+fn deep_tiles_of_one_mesh_equal_the_oracle() {
+    let corner = |layer: usize, x: usize, y: usize| {
+        let depth = (layer * 37 % 160) as f32 * 0.001;
+        Vec3::new((x as f32 - 5.0) * 0.1 + depth, (y as f32 - 5.0) * 0.1, depth)
+    };
+    let triangles = (0..160 * 200).map(|i| {
+        let (layer, cell) = (i / 200, i % 200 / 2);
+        let (x, y) = (cell % 10, cell / 10);
+        let middle = [corner(layer, x + 1, y), corner(layer, x, y + 1)];
+        [middle[i % 2], middle[1 - i % 2], corner(layer, x + i % 2, y + i % 2)]
+    });
+    let scene = one_mesh(triangles, 0.02);
+    let capture = assert_equals_oracle(&Renderer::new(), &scene, &facing(&scene, 32, 32, 1.0));
+    assert!(capture.layers.fragments.len() > 140_000, "{}", capture.layers.fragments.len());
 }
 
 proptest! {

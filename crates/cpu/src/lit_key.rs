@@ -91,3 +91,48 @@ fn halves<S: Simd>(simd: S, keys: &[u64; LANES]) -> [u32x8<S>; 2] {
 fn in_order<T>([low, high]: [T; 2]) -> [T; 2] {
     if cfg!(target_endian = "little") { [low, high] } else { [high, low] }
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{SimdMask, dispatch};
+    use glam::Vec3A;
+    use pellucid_core::shading;
+
+    use super::*;
+    use crate::simd::levels;
+
+    const DEPTHS: [f32; LANES] = [0.0, 1e-45, 1e-39, 0.1, 0.25, 0.5, 0.999_999_9, 1.0];
+
+    #[test]
+    fn depths_and_lights_come_back_and_keys_order_like_depths() {
+        // Squares of these are rounded so much that a normal seems longer than it is.
+        let slight = [3.9e-23, 4.5e-23].map(|z| shading::light(Vec3A::new(2.6e-23, 0.0, z)));
+        let lights = [AMBIENT, AMBIENT.next_up(), 0.6, 1.0, 1.0_f32.next_up(), slight[0], slight[1], 1.99];
+        for (_, level) in levels() {
+            let mut keys = [0; LANES];
+            dispatch!(level, simd => {
+                pack(f32x8::load_array(simd, DEPTHS), f32x8::load_array(simd, lights), &mut keys);
+                let [depths_back, lights_back] = unpack(simd, &keys);
+                assert_eq!([depths_back, lights_back].map(<[f32; LANES]>::from), [DEPTHS, lights]);
+                let ranked = keys.map(|key| key | rank(MOST_RANKS));
+                let (lights_back, is_there) = super::lights(simd, &ranked);
+                assert_eq!((<[f32; LANES]>::from(lights_back), is_there.to_bitmask()), (lights, 0xFF));
+                assert_eq!(super::lights(simd, &[0; LANES]).1.to_bitmask(), 0);
+            });
+            for (i, &key) in keys.iter().enumerate() {
+                assert_eq!((depth(key), light(key)), (DEPTHS[i], lights[i]));
+                assert!(i == 0 || keys[i - 1] | rank(MOST_RANKS) < key | rank(1));
+                assert!(f64::from_bits(key | rank(MOST_RANKS)).is_finite());
+            }
+        }
+    }
+
+    /// However short: up to where squares vanish.
+    #[test]
+    fn no_normal_is_too_bright_for_a_key() {
+        for i in 0..200_000 {
+            let (x, z) = ((i % 447) as f32 * 3e-25, (i / 447) as f32 * 3e-25);
+            assert!((AMBIENT..2.0).contains(&shading::light(Vec3A::new(x, 0.0, z))));
+        }
+    }
+}

@@ -46,9 +46,8 @@ fn main() {
                 turns.push([frame_ms[0], frame_ms[1], gained, at_best, gained / at_best]);
             }
         }
-        let [one_ms, all_ms, gained, at_best, share] = [0, 1, 2, 3, 4].map(|column| {
-            median(turns.iter().map(|turn: &[f64; 5]| turn[column]).collect())
-        });
+        let [one_ms, all_ms, gained, at_best, share] =
+            [0, 1, 2, 3, 4].map(|column| median(turns.iter().map(|turn: &[f64; 5]| turn[column]).collect()));
         println!(
             "{:<20} {one_ms:>12.2} {all_ms:>12.2} {gained:>14.2} {at_best:>18.2} {:>15.0}%",
             case.name,
