@@ -89,6 +89,18 @@ fn what_hardly_gets_through_is_seen_where_nothing_outshines_it() {
     }
 }
 
+/// Also of a background that is not a colour, such as one to be measured by: it counts until as little of it gets through.
+#[test]
+fn what_gets_through_to_a_background_of_any_alpha_is_seen() {
+    let scene = pellucid::load("@planes:n=80").unwrap().scene;
+    for alpha in [0.0, 1.0, -3.0, 1e6, -1e9] {
+        let view = View { background: Vec4::new(0.5, 0.5, 0.5, alpha), ..flat_view(&scene, SIDE, SIDE) }.opacity(0.5);
+        let render =
+            |technique| Renderer::new().technique(technique).render(&scene, &view, Resolve::Blend).unwrap().image;
+        assert!(render(Technique::Cpu) == render(Technique::Oracle), "{alpha}");
+    }
+}
+
 /// Pixels of any number of layers, some of them equally deep: each pixel in an order of its own, then all in one.
 #[test]
 fn layers_come_out_in_order_at_any_number_and_level() {

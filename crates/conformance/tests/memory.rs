@@ -13,7 +13,7 @@ const MIB: usize = 1 << 20;
 
 #[test]
 fn memory_stays_in_the_budget_and_is_used_again() {
-    // 4.6 million fragments of 18 bytes; before the tiles there are 12 MiB of vertices too.
+    // 4.6 million fragments of 12 bytes: 53 MiB beside the picture and what threads need, far more than the budget.
     let scene = pellucid::load("@grids:layers=20,tessellation=200").unwrap().scene;
     let view = View::of(&scene).size(640, 360).opacity(0.3);
     let (picture, vertices) = (640 * 360 * 16, 20 * 201 * 201 * 16);
@@ -29,7 +29,7 @@ fn memory_stays_in_the_budget_and_is_used_again() {
     let renderer = CpuRenderer::new(2);
     let all_at_once = renderer.render(&scene, &view, Resolve::Blend).unwrap();
     let most = ALLOCATOR.max_allocated() - before;
-    assert!(most > 80 * MIB, "{most} bytes at once");
+    assert!(most > 64 * MIB, "{most} bytes at once");
     assert!(bounded.image == all_at_once.image);
 
     // Once it has what it needs, a frame allocates its picture and a little of what does not grow with fragments.

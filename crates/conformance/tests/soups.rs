@@ -92,22 +92,24 @@ fn level_small_triangles_equal_the_oracle_however_many() {
     }
 }
 
-/// 160 layers of small triangles in one tile: more fragments of one colour than are captured at once.
+/// More fragments of one colour in one tile than are captured at once, few and too many at a pixel for keys with light.
 #[test]
 fn deep_tiles_of_one_mesh_equal_the_oracle() {
     let corner = |layer: usize, x: usize, y: usize| {
         let depth = (layer * 37 % 160) as f32 * 0.001;
         Vec3::new((x as f32 - 5.0) * 0.1 + depth, (y as f32 - 5.0) * 0.1, depth)
     };
-    let triangles = (0..160 * 200).map(|i| {
-        let (layer, cell) = (i / 200, i % 200 / 2);
-        let (x, y) = (cell % 10, cell / 10);
-        let middle = [corner(layer, x + 1, y), corner(layer, x, y + 1)];
-        [middle[i % 2], middle[1 - i % 2], corner(layer, x + i % 2, y + i % 2)]
-    });
-    let scene = one_mesh(triangles, 0.02);
-    let capture = assert_equals_oracle(&Renderer::new(), &scene, &facing(&scene, 32, 32, 1.0));
-    assert!(capture.layers.fragments.len() > 140_000, "{}", capture.layers.fragments.len());
+    for layers in [160, 270] {
+        let triangles = (0..layers * 200).map(|i| {
+            let (layer, cell) = (i / 200, i % 200 / 2);
+            let (x, y) = (cell % 10, cell / 10);
+            let middle = [corner(layer, x + 1, y), corner(layer, x, y + 1)];
+            [middle[i % 2], middle[1 - i % 2], corner(layer, x + i % 2, y + i % 2)]
+        });
+        let scene = one_mesh(triangles, 0.02);
+        let capture = assert_equals_oracle(&Renderer::new(), &scene, &facing(&scene, 32, 32, 1.0));
+        assert!(capture.layers.fragments.len() > layers * 900, "{}", capture.layers.fragments.len());
+    }
 }
 
 proptest! {

@@ -1,7 +1,7 @@
 //! Ordered layers to pixels: blended front to back, eight pixels at a time, until nothing behind changes a bit.
 
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
 use crate::fragments::COLOR;
 use crate::lit_key;
@@ -53,10 +53,10 @@ impl<S: Simd> StripComposite<S> {
 
     /// Whether nothing behind changes a bit of any pixel, as none of it has more of a channel than `greatest`.
     #[inline(always)]
-    fn is_complete(&self, greatest: Vec3) -> bool {
+    fn is_complete(&self, greatest: Vec4) -> bool {
         let hides = |channel: f32x8<S>, greatest: f32| (self.transmittance * greatest).simd_le(channel * NOTHING);
         let hidden = hides(self.red, greatest.x) & hides(self.green, greatest.y) & hides(self.blue, greatest.z);
-        (hidden & self.transmittance.simd_le(NOTHING)).all_true()
+        (hidden & (self.transmittance * greatest.w).simd_le(NOTHING)).all_true()
     }
 }
 
@@ -76,7 +76,7 @@ impl TileCapture {
                 }
             }
         }
-        let greatest = frame.greatest_color.max(background.truncate().abs());
+        let greatest = frame.greatest_color.max(background.abs());
         for strip in &self.order.strips {
             let blended = match self.lit_source {
                 Some(source) => self.blend_lit_strip(simd, strip, frame.palette[source as usize], greatest),
@@ -92,7 +92,7 @@ impl TileCapture {
     }
 
     #[inline(always)]
-    fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>, greatest: Vec3) -> StripComposite<S> {
+    fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>, greatest: Vec4) -> StripComposite<S> {
         let mut blended = StripComposite::new(simd);
         let (lights, sources, colors) = self.fragments.lights_and_sources();
         for (i, row) in self.order.rows(strip).iter().enumerate() {
@@ -117,7 +117,7 @@ impl TileCapture {
 
     /// As `blend_strip`, of layers that have one colour before lighting, and their brightness in their keys.
     #[inline(always)]
-    fn blend_lit_strip<S: Simd>(&self, simd: S, strip: &Strip, color: Vec4, greatest: Vec3) -> StripComposite<S> {
+    fn blend_lit_strip<S: Simd>(&self, simd: S, strip: &Strip, color: Vec4, greatest: Vec4) -> StripComposite<S> {
         let mut blended = StripComposite::new(simd);
         let zero = f32x8::splat(simd, 0.0);
         let [red, green, blue, alpha] = color.to_array().map(|channel| f32x8::splat(simd, channel));

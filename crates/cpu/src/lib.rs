@@ -2,8 +2,8 @@
 //!
 //! A frame, by module: `renderer` runs it top to bottom; `setup` brings the vertices of a meshlet to the pixel grid
 //! (`transform`), looks what is in `sight`, turns `small_blocks` of triangles into `small_fragments` (`small`) and other triangles into records,
-//! and hands both to tiles, records through `bin`; `tile` captures `fragments` through `raster`, `order` sorts and `blend` resolves them, eight pixels at a
-//! time, into a `canvas`.
+//! and hands both to tiles, records through `bin`; `tile` captures `fragments` through `raster`, unless `lit_key`s say it all; `order` sorts and
+//! `blend` resolves them, eight pixels at a time, into a `canvas`.
 #![forbid(unsafe_code)]
 
 mod bin;

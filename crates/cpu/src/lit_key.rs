@@ -13,7 +13,7 @@ use crate::simd::words;
 
 /// Bits of brightness, which is at least [`AMBIENT`] and less than 2: a normal so short that its square is rounded much may
 /// give more than 1.
-pub(crate) const LIGHT_BITS: u32 = 25;
+const LIGHT_BITS: u32 = 25;
 
 /// Bits of a fragment's place among those of its pixel in draw order, from 1 on: later drawn ones are in front of others as
 /// deep. 0 where it is not known yet.

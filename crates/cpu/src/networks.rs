@@ -1,4 +1,5 @@
-//! Columns of rows into order: sorting networks over eight columns at a time, and what makes them unnecessary.
+//! Columns of rows into order: sorting networks over as many columns at a time as a vector has, and what makes them
+//! unnecessary.
 
 use fearless_simd::{Bytes, Simd, SimdBase, SimdMask, f64x8, u64x8};
 
@@ -15,24 +16,24 @@ pub(crate) fn padded(count: usize) -> usize {
 /// Sorts every column of the first `count` rows, greatest first: blocks by networks, which are then merged. There are as many
 /// rows as [`padded`] tells.
 #[inline(always)]
-pub(crate) fn sort_rows<S: Simd>(simd: S, padded: &mut [Row], count: usize, last: &mut Permutation) {
+pub(crate) fn sort_rows<S: Simd>(simd: S, rows: &mut [Row], count: usize, last: &mut Permutation) {
     if count <= BLOCK {
-        return sort_few(simd, bytemuck::cast_slice_mut(padded));
+        return sort_few(simd, bytemuck::cast_slice_mut(rows));
     }
-    let rows = &mut padded[..count];
-    if falls(simd, rows) {
+    let there = &mut rows[..count];
+    if falls(simd, there) {
         return;
     }
-    if rises(simd, rows) {
-        rows.reverse();
+    if rises(simd, there) {
+        there.reverse();
         return;
     }
-    if last.apply(simd, rows) {
+    if last.apply(simd, there) {
         return;
     }
-    last.before(rows);
-    sort_many(simd, bytemuck::cast_slice_mut(padded));
-    last.after(&padded[..count]);
+    last.before(there);
+    sort_many(simd, bytemuck::cast_slice_mut(rows));
+    last.after(&rows[..count]);
 }
 
 /// The keys of a row as numbers of the same order.
@@ -117,7 +118,8 @@ fn sort_few<S: Simd>(simd: S, rows: &mut [Keys]) {
         5 => sort!(sort_5),
         6 => sort!(sort_6),
         7 => sort!(sort_7),
-        _ => sort!(sort_8),
+        8 => sort!(sort_8),
+        _ => {}
     }
 }
 

@@ -25,8 +25,8 @@ pub(crate) const STRIP: usize = 8;
 /// The order of a tile's fragments.
 #[derive(Debug)]
 pub(crate) struct Order {
-    /// How many fragments each sample has, if there are strips, and where its first key stands, then that beyond its last;
-    /// each one stands [`STRIP`] further.
+    /// How many fragments each sample has, if there are strips, and where its first key goes, then the next one, [`STRIP`]
+    /// further each; for keys with light below the next one's rank.
     counts: Vec<u32>,
     next: Vec<u32>,
     pub(crate) strips: Vec<Strip>,
@@ -89,7 +89,7 @@ fn put_down(samples: &[u32], depths: &[f32], next: &mut [u32; TILE_SAMPLES], row
     }
 }
 
-/// Counts the fragments in a band, of a tile that is cut into several if `cut`.
+/// Counts the fragments in a band, of a tile that is cut into several if `CUT`.
 #[inline(never)]
 fn count<const CUT: bool>(samples: &[u16], band: Band, counts: &mut [u32; TILE_SAMPLES]) {
     for &sample in samples {
@@ -162,12 +162,12 @@ impl Order {
         let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
         put_down(samples, depths, of_samples(&mut self.next), cleared(&mut self.keys, row_count));
         self.last.begin(Bits { first: 0, count: u32::BITS }, fragments.len() + 1);
-        dispatch!(level, simd => self.sort_strips(simd));
+        self.sort_strips(level);
         totals
     }
 
-    /// Orders those fragments of small triangles that lie in a band, by keys with their brightness; `None`, with nothing
-    /// done, if a pixel has too many for such keys.
+    /// Orders those fragments of small triangles that lie in a band, by keys with their brightness; `None`, and no
+    /// order, if a pixel has too many for such keys.
     pub(crate) fn sort_lit<'a>(
         &mut self,
         level: Level,
@@ -178,12 +178,13 @@ impl Order {
         self.clear();
         self.counts.fill(0);
         let counts = of_samples(&mut self.counts);
-        let count = if band.is_whole_tile() { count::<false> } else { count::<true> };
+        let count_run = if band.is_whole_tile() { count::<false> } else { count::<true> };
         for run in runs.clone() {
-            count(run.samples, band, counts);
+            count_run(run.samples, band, counts);
         }
         let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
         if totals.greatest > lit_key::MOST_RANKS {
+            self.clear();
             return None;
         }
         let next = of_samples(&mut self.next);
@@ -191,17 +192,22 @@ impl Order {
             *next |= FIRST_RANK;
         }
         let keys = bytemuck::cast_slice_mut(cleared(&mut self.keys, row_count));
-        let put_down = if band.is_whole_tile() { put_lit_down::<false> } else { put_lit_down::<true> };
+        let put_run_down = if band.is_whole_tile() { put_lit_down::<false> } else { put_lit_down::<true> };
         for run in runs {
-            put_down(run, band, next, keys);
+            put_run_down(run, band, next, keys);
         }
         self.last.begin(lit_key::RANK, lit_key::MOST_RANKS as usize + 1);
-        dispatch!(level, simd => self.sort_strips(simd));
+        self.sort_strips(level);
         Some(totals)
     }
 
+    #[inline(never)]
+    fn sort_strips(&mut self, level: Level) {
+        dispatch!(level, simd => self.sort_strips_simd(simd));
+    }
+
     #[inline(always)]
-    fn sort_strips<S: Simd>(&mut self, simd: S) {
+    fn sort_strips_simd<S: Simd>(&mut self, simd: S) {
         for strip in &self.strips {
             let (first, count) = (strip.first_row as usize, strip.row_count as usize);
             sort_rows(simd, &mut self.keys[first..first + padded(count)], count, &mut self.last);
@@ -288,7 +294,7 @@ impl Order {
         &self.keys[strip.first_row as usize..(strip.first_row + strip.row_count) as usize]
     }
 
-    /// The numbers of a sample's fragments, nearest first.
+    /// The numbers of a sample's fragments, nearest first, if keys have numbers.
     pub(crate) fn of_sample(&self, sample: usize) -> impl Iterator<Item = u32> {
         let count = if self.strips.is_empty() { 0 } else { self.counts[sample] as usize };
         // A sample without fragments has no first one.

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use fearless_simd::{Level, dispatch};
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 use pellucid_core::pixel_grid::Viewport;
 use pellucid_core::primitive::{Draw, draws};
 use pellucid_core::resolve::{PixelResolver, finish};
@@ -85,7 +85,8 @@ struct Run<'a> {
 }
 
 /// The steps of a frame. Those of tiles run side by side: what they took together is shared out. A picture that is not
-/// filled with the background yet is filled during the first.
+/// filled with the background yet is filled during the first. Of tiles that have one colour nothing is left to do in
+/// "raster"; if a pixel has too many fragments for that, it is found out in "order".
 const STEPS: [&str; 4] = ["transform, setup and bin", "raster", "order", "shade and resolve"];
 
 impl CpuRenderer {
@@ -138,6 +139,8 @@ impl CpuRenderer {
         resolve: Resolve,
         canvas: &mut Canvas,
     ) -> Result<Stats, Error> {
+        // -0 behind something is 0: so it is everywhere.
+        let view = &View { background: view.background + Vec4::ZERO, ..*view };
         self.run(|memory| {
             let mut run = Run::new(scene, view, self.level, self.budget_bytes)?;
             let begun = if canvas.suits(view) {
@@ -211,11 +214,12 @@ impl CpuRenderer {
     }
 }
 
-/// Nothing that is drawn has more of a channel than this: textures and light only take away.
-fn greatest_color(draws: &[Draw<'_>]) -> Vec3 {
-    draws.iter().fold(Vec3::ZERO, |greatest, draw| {
+/// Nothing that is drawn has more of a channel than this, alpha included: textures and light take away, but for what
+/// rounding adds to the light of very short normals, for which there is room.
+fn greatest_color(draws: &[Draw<'_>]) -> Vec4 {
+    draws.iter().fold(Vec4::W, |greatest, draw| {
         let has_vertex_colors = draw.mesh.colors().is_some();
-        greatest.max(if has_vertex_colors { GREATEST_COLOR } else { draw.material.base_color }.truncate())
+        greatest.max(if has_vertex_colors { GREATEST_COLOR } else { draw.material.base_color }.with_w(1.0))
     })
 }
 

@@ -118,7 +118,7 @@ impl SmallBlocks {
         self.blocks.resize(room + room / 4, SmallBlock::default());
     }
 
-    /// Adds what one of eight triangles covers. There must be room for [`MOST_PARTS`].
+    /// Adds what one of eight triangles covers of a block, which may lie in four tiles: there must be room.
     #[inline(always)]
     pub(crate) fn push(&mut self, eight: &EightBlocks, lane: usize, triangle: [u16; 4], grid: &TileGrid) {
         let (covered, place) = (eight.covered[lane], eight.places[lane]);
@@ -292,11 +292,11 @@ fn first_samples<S: Simd>(simd: S, blocks: &[SmallBlock; LANES]) -> [[u16; SIDE_
     let pairs = if cfg!(target_endian = "little") { [[a, b], [c, d]] } else { [[b, a], [d, c]] };
     let [ab, cd] = pairs.map(|[low, high]| (low | (high << 16)) | lanes);
     let (first, last) = ab.interleave(cd);
-    let mut all = [[0; SIDE_BY_SIDE]; LANES];
-    let (first_half, last_half) = bytemuck::cast_slice_mut::<_, u32>(&mut all).split_at_mut(LANES);
+    let mut all = [[0_u32; SIDE_BY_SIDE / 2]; LANES];
+    let (first_half, last_half) = all.as_flattened_mut().split_at_mut(LANES);
     first.store_slice(first_half);
     last.store_slice(last_half);
-    all
+    bytemuck::cast(all)
 }
 
 /// The number of the only bit that is set; anything below 32 if none is.

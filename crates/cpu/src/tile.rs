@@ -1,7 +1,7 @@
 //! One tile: opaque surfaces through a depth buffer, then transparent ones captured in draw order.
 
 use fearless_simd::{Level, Simd, dispatch};
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 use pellucid_core::fragment::order_key;
 use pellucid_core::layers::OpaqueSurface;
 use pellucid_core::pixel_grid::ScreenTriangle;
@@ -119,7 +119,7 @@ pub(crate) struct FrameParts<'a> {
     /// Colours of draws where nothing varies, before lighting: that of draw `i` stands at `i + 1`, none at 0.
     pub(crate) palette: &'a [Vec4],
     /// Nothing that is drawn has more of a channel than this.
-    pub(crate) greatest_color: Vec3,
+    pub(crate) greatest_color: Vec4,
     pub(crate) grid: &'a TileGrid,
     pub(crate) level: Level,
 }
@@ -127,7 +127,8 @@ pub(crate) struct FrameParts<'a> {
 /// Fragments that a capture is meant to have at most: more leave the second-level cache.
 const MOST_FRAGMENTS: u64 = 1 << 16;
 
-/// Those that a tile of one source is meant to have, of which nothing is kept but keys.
+/// Those of a tile of one source, of which nothing is kept but keys; if these have no room for its light, it is captured after
+/// all, twice as many fragments at a time as others.
 const MOST_LIT_FRAGMENTS: u64 = 1 << 17;
 
 /// Fewest rows of a band: what it takes to set up a triangle again in each is shared by few fragments then.
@@ -216,7 +217,6 @@ impl TileCapture {
     pub(crate) fn capture_nothing(&mut self, number: u32, frame: FrameParts<'_>) {
         self.rect = frame.grid.tile(number);
         self.forget_opaque();
-        self.fragments.clear();
         self.order.clear();
         self.lit_source = None;
     }
@@ -242,7 +242,7 @@ impl TileCapture {
         self.order.sort(frame.level, &self.fragments)
     }
 
-    /// Whether nothing was captured.
+    /// Whether nothing was found, once it is ordered.
     pub(crate) fn is_empty(&self) -> bool {
         self.order.strips.is_empty() && !self.has_opaque
     }
