@@ -124,8 +124,8 @@ impl SmallFragments {
     /// Adds how many bytes each tile needs.
     pub(crate) fn add_bytes(&self, bytes: &mut [u64]) {
         for run in &self.runs {
-            let run_bytes = size_of::<Run>() + size_of::<Run>();
-            bytes[run.tile as usize] += (run.count as usize * FRAGMENT_BYTES + run_bytes) as u64;
+            // A run stands in both lists.
+            bytes[run.tile as usize] += (run.count as usize * FRAGMENT_BYTES + 2 * size_of::<Run>()) as u64;
         }
     }
 
