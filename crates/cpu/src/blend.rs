@@ -1,11 +1,11 @@
 //! Ordered layers to pixels: blended front to back, eight pixels at a time, until nothing behind changes a bit.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch, f32x8, u32x8};
 use glam::Vec4;
 
 use crate::fragments::COLOR;
 use crate::lit_key;
-use crate::order::{STRIP, Strip};
+use crate::order::{Row, STRIP, Strip, lane_numbers};
 use crate::simd::{columns, each_lane, rows};
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
@@ -95,24 +95,61 @@ impl TileCapture {
     fn blend_strip<S: Simd>(&self, simd: S, strip: &Strip, frame: FrameParts<'_>, greatest: Vec4) -> StripComposite<S> {
         let mut blended = StripComposite::new(simd);
         let (lights, sources, colors) = self.fragments.lights_and_sources();
+        let has_whole_rows = self.fragments.has_whole_rows();
         for (i, row) in self.order.rows(strip).iter().enumerate() {
-            let numbers = row.0.map(|key| key as u32 as usize);
-            let mut layer = [[0.0; 4]; STRIP];
-            for (color, number) in layer.iter_mut().zip(numbers) {
-                let source = sources[number];
-                *color = if source & COLOR == 0 {
-                    let (color, light) = (frame.palette[source as usize], lights[number]);
-                    (color * Vec4::new(light, light, light, 1.0)).to_array()
-                } else {
-                    colors[(source & !COLOR) as usize]
-                };
-            }
-            blended.under(columns(simd, &layer));
+            let layer = if has_whole_rows && let Some(layer) = self.layer_of_one(simd, row, frame) {
+                layer
+            } else {
+                let numbers = row.0.map(|key| key as u32 as usize);
+                let mut layer = [[0.0; 4]; STRIP];
+                for (color, number) in layer.iter_mut().zip(numbers) {
+                    let source = sources[number];
+                    *color = if source & COLOR == 0 {
+                        let (color, light) = (frame.palette[source as usize], lights[number]);
+                        (color * Vec4::new(light, light, light, 1.0)).to_array()
+                    } else {
+                        colors[(source & !COLOR) as usize]
+                    };
+                }
+                columns(simd, &layer)
+            };
+            blended.under(layer);
             if i % LAYERS_A_LOOK == LAYERS_A_LOOK - 1 && blended.is_complete(greatest) {
                 break;
             }
         }
         blended
+    }
+
+    /// The colours of a row's fragments, if these were captured one after the other, as those of one triangle are.
+    #[inline(always)]
+    fn layer_of_one<S: Simd>(&self, simd: S, row: &Row, frame: FrameParts<'_>) -> Option<[f32x8<S>; 4]> {
+        let (lights, sources, colors) = self.fragments.lights_and_sources();
+        let lanes = lane_numbers(simd);
+        let first = row.0[0] as u32;
+        if row.0[STRIP - 1] as u32 != first + (STRIP as u32 - 1) {
+            return None;
+        }
+        let [numbers, _] = lit_key::halves(simd, &row.0);
+        if !numbers.simd_eq(lanes + first).all_true() {
+            return None;
+        }
+        let range = first as usize..first as usize + STRIP;
+        let source = sources[range.start];
+        let sources = u32x8::from_slice(simd, &sources[range.clone()]);
+        if source & COLOR == 0 {
+            if !sources.simd_eq(source).all_true() {
+                return None;
+            }
+            let light = f32x8::from_slice(simd, &lights[range]);
+            let [red, green, blue, alpha] = frame.palette[source as usize].to_array();
+            return Some([light * red, light * green, light * blue, f32x8::splat(simd, alpha)]);
+        }
+        if !sources.simd_eq(lanes + source).all_true() {
+            return None;
+        }
+        let first = (source & !COLOR) as usize;
+        Some(columns(simd, &colors[first..first + STRIP]))
     }
 
     /// As `blend_strip`, of layers that have one colour before lighting, and their brightness in their keys.

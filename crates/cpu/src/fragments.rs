@@ -3,6 +3,7 @@
 use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdMask, SimdWiden, dispatch};
 use fearless_simd::{f32x8, mask32x8, u16x8, u32x8};
 
+use crate::bin::TILE_PX;
 use crate::lit_key;
 use crate::shade::SHADED_LANES;
 use crate::small_fragments::RunFragments;
@@ -22,6 +23,9 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
+    /// Where a triangle has a fragment at every sample of a row of the tile: numbers of the first ones. What is done with each
+    /// can be done with eight of them at once.
+    whole_rows: Vec<u32>,
     /// Colours of those that were shaded when they were captured; beyond `color_count` is room.
     colors: Vec<[f32; 4]>,
     color_count: usize,
@@ -45,6 +49,9 @@ pub(crate) struct Room<'a> {
     pub(crate) lights: &'a mut [f32],
     pub(crate) sources: &'a mut [u32],
     pub(crate) primitives: &'a mut [u32],
+    /// The number of the first.
+    pub(crate) first: u32,
+    pub(crate) whole_rows: &'a mut Vec<u32>,
 }
 
 /// Where what a vector of fragments gets when it is shaded can be put.
@@ -64,6 +71,7 @@ impl Default for Fragments {
             lights: Vec::new(),
             sources: Vec::new(),
             primitives: Vec::new(),
+            whole_rows: Vec::new(),
             colors: Vec::new(),
             color_count: 0,
         };
@@ -75,6 +83,7 @@ impl Default for Fragments {
 impl Fragments {
     pub(crate) fn clear(&mut self) {
         self.end = 1;
+        self.whole_rows.clear();
         self.color_count = 0;
     }
 
@@ -106,6 +115,8 @@ impl Fragments {
             lights: &mut self.lights[range.clone()],
             sources: &mut self.sources[range.clone()],
             primitives: &mut self.primitives[range],
+            first: self.end as u32,
+            whole_rows: &mut self.whole_rows,
         }
     }
 
@@ -181,6 +192,24 @@ impl Fragments {
     #[inline(always)]
     pub(crate) fn end(&self) -> usize {
         self.end
+    }
+
+    /// Numbers of the first of eight fragments each, at eight neighbours from a multiple of eight on, as far as they lie in
+    /// whole rows.
+    #[inline(always)]
+    pub(crate) fn eights(&self) -> impl Iterator<Item = usize> {
+        self.whole_rows.iter().flat_map(|&row| (row as usize..row as usize + TILE_PX as usize).step_by(SHADED_LANES))
+    }
+
+    #[inline(always)]
+    pub(crate) fn has_whole_rows(&self) -> bool {
+        !self.whole_rows.is_empty()
+    }
+
+    /// Some fragments from a number on are about to be left out, so that others get their numbers.
+    pub(crate) fn forget_whole_rows(&mut self, first: usize) {
+        let kept = self.whole_rows.partition_point(|&row| (row as usize) < first);
+        self.whole_rows.truncate(kept);
     }
 
     /// Leaves out the fragments from a number on.
@@ -284,6 +313,6 @@ impl Fragments {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.depths.capacity() * 20 + self.colors.capacity() * size_of::<[f32; 4]>()
+        self.depths.capacity() * 20 + self.whole_rows.capacity() * 4 + self.colors.capacity() * size_of::<[f32; 4]>()
     }
 }

@@ -82,13 +82,13 @@ pub(crate) fn lights<S: Simd>(simd: S, keys: &[u64; LANES]) -> (f32x8<S>, mask32
 
 /// The lower and the upper halves of keys.
 #[inline(always)]
-fn halves<S: Simd>(simd: S, keys: &[u64; LANES]) -> [u32x8<S>; 2] {
+pub(crate) fn halves<S: Simd>(simd: S, keys: &[u64; LANES]) -> [u32x8<S>; 2] {
     in_order(words(u64x8::load_array_ref(simd, keys).bitcast()))
 }
 
 /// The lower and the upper half of a number as they lie in memory, or the other way round.
 #[inline(always)]
-fn in_order<T>([low, high]: [T; 2]) -> [T; 2] {
+pub(crate) fn in_order<T>([low, high]: [T; 2]) -> [T; 2] {
     if cfg!(target_endian = "little") { [low, high] } else { [high, low] }
 }
 

@@ -9,8 +9,11 @@
 //! order, this orders like the contract's order key. Keys are positive and look like f64 numbers of the same order, and of
 //! those every SIMD level has maximum and minimum.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, i32x8, u32x8};
+use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdCombine, SimdMask, dispatch};
+use fearless_simd::{f32x8, i32x8, u32x8, u64x8};
 
 use crate::fragments::Fragments;
 use crate::lit_key;
@@ -76,17 +79,86 @@ fn class(count: u32) -> usize {
     (32 + (log - 5) * 8 + (count >> (log - 3) & 7)) as usize
 }
 
-/// Puts the keys of fragments into rows: where a sample's next one goes, `next` tells. A function of its own, so that its
-/// counters stay in registers.
+/// Counts the fragments at each sample.
+#[inline(always)]
+fn count_all<S: Simd>(simd: S, fragments: &Fragments, counts: &mut [u32; TILE_SAMPLES]) {
+    let (samples, _) = fragments.samples_and_depths();
+    let mut from = 1;
+    for eight in fragments.eights() {
+        if from < eight {
+            count_each(&samples[from..eight], counts);
+        }
+        let counts = of_eight(counts, samples[eight]);
+        (u32x8::load_array_ref(simd, counts) + 1).store_array(counts);
+        from = eight + STRIP;
+    }
+    count_each(&samples[from..], counts);
+}
+
+#[inline(always)]
+fn count_each(samples: &[u32], counts: &mut [u32; TILE_SAMPLES]) {
+    for &sample in samples {
+        counts[sample as usize % TILE_SAMPLES] += 1;
+    }
+}
+
+/// Puts the keys of fragments into rows: where a sample's next one goes, `next` tells.
+#[inline(always)]
+fn put_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
+    let lanes = lane_numbers(simd);
+    let (samples, depths) = fragments.samples_and_depths();
+    let mut from = 1;
+    for eight in fragments.eights() {
+        let these = eight..eight + STRIP;
+        let is_strip = {
+            let places = of_eight(next, samples[these.start]);
+            u32x8::load_array_ref(simd, places).simd_eq(lanes + places[0]).all_true()
+        };
+        if !is_strip {
+            continue;
+        }
+        if from < these.start {
+            put_each_down(samples, depths, from..these.start, next, rows);
+        }
+        let places = of_eight(next, samples[these.start]);
+        let their_depths = f32x8::from_slice(simd, &depths[these.clone()]);
+        let [first, second] = lit_key::in_order([lanes + eight as u32, their_depths.bitcast()]);
+        let (low, high) = first.interleave(second);
+        low.combine(high).bitcast::<u64x8<S>>().store_array(&mut rows[places[0] as usize / STRIP].0);
+        (lanes + (places[0] + STRIP as u32)).store_array(places);
+        from = these.end;
+    }
+    put_each_down(samples, depths, from..samples.len(), next, rows);
+}
+
+/// Fragment by fragment. A function of its own, so that its counters stay in registers.
 #[inline(never)]
-fn put_down(samples: &[u32], depths: &[f32], next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
+fn put_each_down(
+    samples: &[u32],
+    depths: &[f32],
+    numbers: Range<usize>,
+    next: &mut [u32; TILE_SAMPLES],
+    rows: &mut [Row],
+) {
     let keys: &mut [u64] = bytemuck::cast_slice_mut(rows);
-    for (before, (&sample, &depth)) in samples[1..].iter().zip(&depths[1..]).enumerate() {
+    let first = numbers.start as u64;
+    for (after, (&sample, &depth)) in samples[numbers.clone()].iter().zip(&depths[numbers]).enumerate() {
         let place = &mut next[sample as usize % TILE_SAMPLES];
-        // Number 0 is no fragment.
-        keys[*place as usize] = u64::from(depth.to_bits()) << 32 | (before as u64 + 1);
+        keys[*place as usize] = u64::from(depth.to_bits()) << 32 | (first + after as u64);
         *place += STRIP as u32;
     }
+}
+
+/// What there is for eight neighbours, the first of which is at a multiple of eight.
+#[inline(always)]
+fn of_eight(values: &mut [u32; TILE_SAMPLES], first: u32) -> &mut [u32; STRIP] {
+    &mut values.as_chunks_mut().0[first as usize / STRIP % (TILE_SAMPLES / STRIP)]
+}
+
+/// 0 to 7.
+#[inline(always)]
+pub(crate) fn lane_numbers<S: Simd>(simd: S) -> u32x8<S> {
+    u32x8::load_array(simd, each_lane(|lane| lane as u32))
 }
 
 /// Counts the fragments in a band, of a tile that is cut into several if `CUT`.
@@ -154,13 +226,12 @@ impl Order {
             return totals;
         }
         self.counts.fill(0);
-        let (samples, depths) = fragments.samples_and_depths();
         let counts = of_samples(&mut self.counts);
-        for &sample in &samples[1..] {
-            counts[sample as usize % TILE_SAMPLES] += 1;
-        }
-        let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
-        put_down(samples, depths, of_samples(&mut self.next), cleared(&mut self.keys, row_count));
+        dispatch!(level, simd => count_all(simd, fragments, counts));
+        let stay_together = fragments.has_whole_rows();
+        let row_count = dispatch!(level, simd => self.make_strips(simd, stay_together, &mut totals));
+        let (next, rows) = (of_samples(&mut self.next), cleared(&mut self.keys, row_count));
+        dispatch!(level, simd => put_down(simd, fragments, next, rows));
         self.last.begin(Bits { first: 0, count: u32::BITS }, fragments.len() + 1);
         self.sort_strips(level);
         totals
@@ -182,7 +253,7 @@ impl Order {
         for run in runs.clone() {
             count_run(run.samples, band, counts);
         }
-        let row_count = dispatch!(level, simd => self.make_strips(simd, &mut totals));
+        let row_count = dispatch!(level, simd => self.make_strips(simd, false, &mut totals));
         if totals.greatest > lit_key::MOST_RANKS {
             self.clear();
             return None;
@@ -215,10 +286,11 @@ impl Order {
     }
 
     /// Puts the samples that have fragments together into strips; returns how many rows these have. Neighbours that have
-    /// few are a strip, however few; others are first sorted by how many.
+    /// few are a strip, however few, and so are those that have as many, but for what rows are padded with; others are first
+    /// sorted by how many.
     #[inline(always)]
-    fn make_strips<S: Simd>(&mut self, simd: S, totals: &mut FragmentCounts) -> usize {
-        let lanes = u32x8::load_array(simd, each_lane(|lane| lane as u32));
+    fn make_strips<S: Simd>(&mut self, simd: S, stay_together: bool, totals: &mut FragmentCounts) -> usize {
+        let lanes = lane_numbers(simd);
         let mut fragments = u32x8::splat(simd, 0);
         let mut row_count = 0;
         let mut many = [0u16; TILE_SAMPLES / STRIP];
@@ -233,7 +305,10 @@ impl Order {
             totals.covered_pixels += u64::from(covered.count_ones());
             let greatest = counts.reduce_max();
             totals.greatest = totals.greatest.max(greatest);
-            if greatest as usize > BLOCK {
+            let rows = padded(greatest as usize);
+            let stays =
+                greatest as usize <= BLOCK || stay_together && rows <= padded(counts.reduce_min() as usize) + BLOCK;
+            if !stays {
                 many[many_count] = group as u16;
                 many_count += 1;
                 continue;
@@ -243,7 +318,7 @@ impl Order {
             (lanes + (row_count * STRIP) as u32).store_slice(&mut self.next[first..first + STRIP]);
             let strip = Strip { first_row: row_count as u32, row_count: greatest, samples, sample_count: STRIP as u32 };
             self.strips.push(strip);
-            row_count += greatest as usize;
+            row_count += rows;
         }
         totals.fragments += u64::from(fragments.reduce_sum());
         if many_count > 0 {

@@ -231,6 +231,9 @@ impl<'a, S: Simd> RowFragments<'a, S> {
         let row = f64x8::splat(simd, self.depths.row(y));
         let dx = f64x8::splat(simd, self.depths.plane.dx);
         let [least, greatest] = self.depths.range;
+        if mask == u32::MAX && hidden.is_none() {
+            room.whole_rows.push(room.first + *count as u32);
+        }
         let mut mask = u64::from(mask);
         while mask != 0 {
             let x = mask.trailing_zeros();

@@ -132,6 +132,9 @@ impl Unshaded {
     fn shade_simd<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
         let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
         fragments.make_room_after(LANES);
+        if draw.cutoff.is_some() {
+            fragments.forget_whole_rows(self.first);
+        }
         let is_tested = draw.cutoff.is_some() && self.test_alphas(simd, draw, fragments);
         let end = fragments.end();
         fragments.make_room_for_colors(self.count + LANES);
