@@ -1,9 +1,11 @@
 //! Random triangle soups: the CPU renderer captures what the oracle captures, to the last bit, and resolves it alike.
 
-use glam::{Affine3A, Vec3, Vec4};
+use glam::{Affine2, Affine3A, Vec2, Vec3, Vec3Swizzles, Vec4};
 use pellucid::core::meshlets::MESHLET_TRIANGLES;
 use pellucid::core::oracle;
-use pellucid::{Camera, Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, View};
+use pellucid::core::scene::MaterialTexture;
+use pellucid::core::texture::Sampler;
+use pellucid::{AlphaMode, Camera, Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, Texture, View};
 use pellucid_conformance::{images, layers};
 use proptest::prelude::*;
 
@@ -109,6 +111,53 @@ fn deep_tiles_of_one_mesh_equal_the_oracle() {
         let scene = one_mesh(triangles, 0.02);
         let capture = assert_equals_oracle(&Renderer::new(), &scene, &facing(&scene, 32, 32, 1.0));
         assert!(capture.layers.fragments.len() > layers * 900, "{}", capture.layers.fragments.len());
+    }
+}
+
+/// Sheets before the whole picture, through each other, of every kind of colour, more of them than are sorted in registers; and
+/// in some places so much dust that neighbours have far more fragments than others.
+#[test]
+fn sheets_over_whole_tiles_equal_the_oracle() {
+    let mut scene = Scene::new();
+    let texels = (0..64u8).map(|i| [i * 4, 200, 255 - i * 3, if i % 5 == 0 { 40 } else { 230 }]).collect();
+    let texture = scene.add_texture(Texture::new(8, 8, texels, Sampler::default()).unwrap()).unwrap();
+    let texture = MaterialTexture { texture, transform: Affine2::from_scale(Vec2::splat(3.0)) };
+    let dust_mesh = scene.add_mesh(dust(600, true)).unwrap();
+    for number in 0..24 {
+        let tilt = |axis: usize| ((number * (7 + axis * 4)) % 24) as f32 * 0.02 - 0.23;
+        let corner = |x: f32, y: f32| Vec3::new(x, y, x * tilt(0) + y * tilt(1) + tilt(2));
+        let corners = [corner(-9.0, -9.0), corner(9.0, -9.0), corner(9.0, 9.0), corner(-9.0, 9.0)].to_vec();
+        let (normals, tex_coords) = (corners.iter().map(|c| c.yzx()), corners.iter().map(|c| c.xy()));
+        let mut mesh = Mesh::new(corners.clone(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        if number % 2 == 0 {
+            mesh = mesh.with_normals(normals.collect()).unwrap();
+        }
+        let kind = number % 4;
+        if kind == 1 {
+            mesh = mesh.with_colors((0..4).map(|i| Vec4::splat(0.2 + 0.2 * i as f32)).collect()).unwrap();
+        }
+        if kind >= 2 {
+            mesh = mesh.with_tex_coords(tex_coords.collect()).unwrap();
+        }
+        let mesh = scene.add_mesh(mesh).unwrap();
+        let material = scene
+            .add_material(Material {
+                base_color: Vec4::new(0.9, 0.04 * number as f32, 0.5, 0.4),
+                alpha_mode: if kind == 3 { AlphaMode::Mask { cutoff: 0.3 } } else { AlphaMode::Blend },
+                double_sided: true,
+                texture: (kind >= 2).then_some(texture),
+                ..Material::default()
+            })
+            .unwrap();
+        scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+        if number % 8 == 5 {
+            let world_from_mesh = Affine3A::from_scale(Vec3::new(0.2, 0.2, 1.0));
+            scene.add_instance(Instance { mesh: dust_mesh, material, world_from_mesh }).unwrap();
+        }
+    }
+    for opacity in [1.0, 0.6] {
+        let view = facing(&scene, 96, 64, 4.0).opacity(opacity);
+        assert_equals_oracle(&Renderer::new(), &scene, &view);
     }
 }
 

@@ -109,22 +109,23 @@ fn put_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_SAMPL
     let (samples, depths) = fragments.samples_and_depths();
     let mut from = 1;
     for eight in fragments.eights() {
+        if from < eight {
+            put_each_down(samples, depths, from..eight, next, rows);
+            from = eight;
+        }
         let these = eight..eight + STRIP;
-        let is_strip = {
-            let places = of_eight(next, samples[these.start]);
-            u32x8::load_array_ref(simd, places).simd_eq(lanes + places[0]).all_true()
-        };
-        if !is_strip {
+        let places = of_eight(next, samples[eight]);
+        let row = places[0] as usize / STRIP;
+        // Unless the eight are a strip and have as many fragments so far.
+        if places[0] as usize != row * STRIP
+            || !u32x8::load_array_ref(simd, places).simd_eq(lanes + places[0]).all_true()
+        {
             continue;
         }
-        if from < these.start {
-            put_each_down(samples, depths, from..these.start, next, rows);
-        }
-        let places = of_eight(next, samples[these.start]);
         let their_depths = f32x8::from_slice(simd, &depths[these.clone()]);
         let [first, second] = lit_key::in_order([lanes + eight as u32, their_depths.bitcast()]);
         let (low, high) = first.interleave(second);
-        low.combine(high).bitcast::<u64x8<S>>().store_array(&mut rows[places[0] as usize / STRIP].0);
+        low.combine(high).bitcast::<u64x8<S>>().store_array(&mut rows[row].0);
         (lanes + (places[0] + STRIP as u32)).store_array(places);
         from = these.end;
     }
