@@ -23,8 +23,8 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
-    /// Where a triangle has a fragment at every sample of a row of the tile: numbers of the first ones. What is done with each
-    /// can be done with eight of them at once.
+    /// Where a triangle has a fragment at every sample of a row of the tile: numbers of the first ones, as far as they are noted.
+    /// What is done with each can be done with eight of them at once.
     whole_rows: Vec<u32>,
     /// Colours of those that were shaded when they were captured; beyond `color_count` is room.
     colors: Vec<[f32; 4]>,
@@ -49,9 +49,6 @@ pub(crate) struct Room<'a> {
     pub(crate) lights: &'a mut [f32],
     pub(crate) sources: &'a mut [u32],
     pub(crate) primitives: &'a mut [u32],
-    /// The number of the first.
-    pub(crate) first: u32,
-    pub(crate) whole_rows: &'a mut Vec<u32>,
 }
 
 /// Where what a vector of fragments gets when it is shaded can be put.
@@ -115,8 +112,6 @@ impl Fragments {
             lights: &mut self.lights[range.clone()],
             sources: &mut self.sources[range.clone()],
             primitives: &mut self.primitives[range],
-            first: self.end as u32,
-            whole_rows: &mut self.whole_rows,
         }
     }
 
@@ -199,6 +194,11 @@ impl Fragments {
     #[inline(always)]
     pub(crate) fn eights(&self) -> impl Iterator<Item = usize> {
         self.whole_rows.iter().flat_map(|&row| (row as usize..row as usize + TILE_PX as usize).step_by(SHADED_LANES))
+    }
+
+    /// Notes that the fragments from a number on fill rows of the tile.
+    pub(crate) fn note_whole_rows(&mut self, first: usize) {
+        self.whole_rows.extend((first..self.end).step_by(TILE_PX as usize).map(|first| first as u32));
     }
 
     #[inline(always)]

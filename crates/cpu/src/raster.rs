@@ -45,6 +45,14 @@ pub(crate) struct Coverage {
     pub(crate) rows: [u32; TILE_PX as usize],
 }
 
+impl Coverage {
+    /// Whether every row that is covered is covered from end to end.
+    #[inline(always)]
+    pub(crate) fn has_whole_rows(&self) -> bool {
+        self.rows[self.top] == u32::MAX && self.rows[self.top..=self.bottom].iter().all(|&row| row == u32::MAX)
+    }
+}
+
 /// Lanes of a vector of edge values.
 const LANES: i32 = 8;
 
@@ -231,9 +239,6 @@ impl<'a, S: Simd> RowFragments<'a, S> {
         let row = f64x8::splat(simd, self.depths.row(y));
         let dx = f64x8::splat(simd, self.depths.plane.dx);
         let [least, greatest] = self.depths.range;
-        if mask == u32::MAX && hidden.is_none() {
-            room.whole_rows.push(room.first + *count as u32);
-        }
         let mut mask = u64::from(mask);
         while mask != 0 {
             let x = mask.trailing_zeros();

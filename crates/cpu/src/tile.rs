@@ -397,6 +397,9 @@ impl TileCapture {
             rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut room, &mut count);
         }
         self.fragments.advance(count);
+        if hidden.is_none() && coverage.has_whole_rows() {
+            self.fragments.note_whole_rows(first);
+        }
         if draw.varies() && self.fragments.end() > first {
             let piece = chunk.piece(record, triangle);
             let [anchor_x, anchor_y] = triangle.anchor_px();
