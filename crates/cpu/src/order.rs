@@ -79,15 +79,13 @@ fn class(count: u32) -> usize {
     (32 + (log - 5) * 8 + (count >> (log - 3) & 7)) as usize
 }
 
-/// Counts the fragments at each sample.
+/// Counts the fragments at each sample, eight at a time where they fill rows of the tile.
 #[inline(always)]
-fn count_all<S: Simd>(simd: S, fragments: &Fragments, counts: &mut [u32; TILE_SAMPLES]) {
+fn count_rows<S: Simd>(simd: S, fragments: &Fragments, counts: &mut [u32; TILE_SAMPLES]) {
     let (samples, _) = fragments.samples_and_depths();
     let mut from = 1;
     for eight in fragments.eights() {
-        if from < eight {
-            count_each(&samples[from..eight], counts);
-        }
+        count_each(&samples[from..eight], counts);
         let counts = of_eight(counts, samples[eight]);
         (u32x8::load_array_ref(simd, counts) + 1).store_array(counts);
         from = eight + STRIP;
@@ -95,6 +93,7 @@ fn count_all<S: Simd>(simd: S, fragments: &Fragments, counts: &mut [u32; TILE_SA
     count_each(&samples[from..], counts);
 }
 
+/// Counts fragment by fragment.
 #[inline(always)]
 fn count_each(samples: &[u32], counts: &mut [u32; TILE_SAMPLES]) {
     for &sample in samples {
@@ -102,9 +101,10 @@ fn count_each(samples: &[u32], counts: &mut [u32; TILE_SAMPLES]) {
     }
 }
 
-/// Puts the keys of fragments into rows: where a sample's next one goes, `next` tells.
+/// Puts the keys of fragments into rows, eight at a time where they fill rows of the tile: where a sample's next one goes, `next`
+/// tells.
 #[inline(always)]
-fn put_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
+fn put_rows_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_SAMPLES], rows: &mut [Row]) {
     let lanes = lane_numbers(simd);
     let (samples, depths) = fragments.samples_and_depths();
     let mut from = 1;
@@ -132,7 +132,7 @@ fn put_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_SAMPL
     put_each_down(samples, depths, from..samples.len(), next, rows);
 }
 
-/// Fragment by fragment. A function of its own, so that its counters stay in registers.
+/// Puts the keys of fragments down one by one. A function of its own, so that its counters stay in registers.
 #[inline(never)]
 fn put_each_down(
     samples: &[u32],
@@ -172,7 +172,7 @@ fn count<const CUT: bool>(samples: &[u16], band: Band, counts: &mut [u32; TILE_S
     }
 }
 
-/// As [`put_down`], of fragments in a band, whose keys only lack a rank.
+/// As [`put_each_down`], of fragments in a band, whose keys only lack a rank.
 #[inline(never)]
 fn put_lit_down<const CUT: bool>(run: RunFragments<'_>, band: Band, next: &mut [u32; TILE_SAMPLES], keys: &mut [u64]) {
     for (&sample, &key) in run.samples.iter().zip(run.keys) {
@@ -228,11 +228,20 @@ impl Order {
         }
         self.counts.fill(0);
         let counts = of_samples(&mut self.counts);
-        dispatch!(level, simd => count_all(simd, fragments, counts));
-        let stay_together = fragments.has_whole_rows();
-        let row_count = dispatch!(level, simd => self.make_strips(simd, stay_together, &mut totals));
+        let (samples, depths) = fragments.samples_and_depths();
+        let has_whole_rows = fragments.has_whole_rows();
+        if has_whole_rows {
+            dispatch!(level, simd => count_rows(simd, fragments, counts));
+        } else {
+            count_each(&samples[1..], counts);
+        }
+        let row_count = dispatch!(level, simd => self.make_strips(simd, has_whole_rows, &mut totals));
         let (next, rows) = (of_samples(&mut self.next), cleared(&mut self.keys, row_count));
-        dispatch!(level, simd => put_down(simd, fragments, next, rows));
+        if has_whole_rows {
+            dispatch!(level, simd => put_rows_down(simd, fragments, next, rows));
+        } else {
+            put_each_down(samples, depths, 1..samples.len(), next, rows);
+        }
         self.last.begin(Bits { first: 0, count: u32::BITS }, fragments.len() + 1);
         self.sort_strips(level);
         totals
@@ -287,8 +296,8 @@ impl Order {
     }
 
     /// Puts the samples that have fragments together into strips; returns how many rows these have. Neighbours that have
-    /// few are a strip, however few, and so are those that have as many, but for what rows are padded with; others are first
-    /// sorted by how many.
+    /// few are a strip, however few; others are first sorted by how many, unless neighbours shall stay together and have about
+    /// equally many.
     #[inline(always)]
     fn make_strips<S: Simd>(&mut self, simd: S, stay_together: bool, totals: &mut FragmentCounts) -> usize {
         let lanes = lane_numbers(simd);
