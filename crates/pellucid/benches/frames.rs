@@ -1,22 +1,34 @@
 //! Whole frames of the CPU renderer, without loading: `cargo bench -p pellucid [-- NAME ...]`.
 //!
-//! Prints the median and the spread of each scene's frames, in milliseconds.
+//! Prints the median and the spread of each scene's frames, in milliseconds. Then what a fragment costs, the more there are:
+//! frames of 10 million to a billion, in turns, so that what others do to the machine meanwhile is done to all of them.
 //!
 //! With `--on-request` it renders a frame for each line of its input, which is the number of one of the scenes named, and
 //! prints the milliseconds it took. So two builds are compared frame by frame in turns, which on a machine that others use
 //! too tells apart what differs by a few hundredths.
 
 mod common;
+#[path = "common/median.rs"]
+mod median;
 
 use std::io::stdin;
 
 use common::{Case, SCENES, case};
+use median::median;
 use pellucid::{Canvas, Renderer, Resolve};
 
-/// Frames of a case, but for those of a billion fragments.
+/// Frames of a case.
 const FRAMES: usize = 25;
 
-const FRAMES_OF_A_BILLION: usize = 3;
+/// Planes that fill the picture, drawn in any order.
+const PLANES: [Case; 3] = [
+    case("planes_10m", "", "@planes:n=11"),
+    case("planes_100m", "", "@planes:n=109"),
+    case("planes_1g", "", "@planes:n=1085"),
+];
+
+/// Frames of each of [`PLANES`].
+const TURNS: usize = 9;
 
 fn main() {
     if std::env::args().any(|argument| argument == "--on-request") {
@@ -27,11 +39,9 @@ fn main() {
         "scene", "triangles", "fragments", "depth", "median ms", "least", "greatest", "peak MiB"
     );
     for case in common::wanted(SCENES) {
-        measure(&case, FRAMES);
+        measure(&case);
     }
-    for case in common::wanted([Case { size: (1920, 1080), ..case("planes_1g", "", "@planes:n=500") }]) {
-        measure(&case, FRAMES_OF_A_BILLION);
-    }
+    measure_in_turns(common::wanted(PLANES));
 }
 
 fn render_on_request() {
@@ -50,13 +60,13 @@ fn render_on_request() {
     }
 }
 
-fn measure(case: &Case, frames: usize) {
+fn measure(case: &Case) {
     let (scene, view) = case.load();
     let renderer = Renderer::new();
     let mut canvas = Canvas::new();
     // The first frame allocates.
     let mut all = Vec::new();
-    for _ in 0..=frames {
+    for _ in 0..=FRAMES {
         match renderer.render_into(&scene, &view, Resolve::Blend, &mut canvas) {
             Ok(stats) => all.push(stats),
             Err(error) => return println!("{:<20} {error}", case.name),
@@ -80,4 +90,30 @@ fn measure(case: &Case, frames: usize) {
         steps.join(", "),
         if source.starts_with('@') { format!("  ({source})") } else { String::new() }
     );
+}
+
+/// Prints what a fragment takes in each case.
+fn measure_in_turns(cases: Vec<Case>) {
+    let mut all: Vec<_> =
+        cases.iter().map(|case| (case.name, case.load(), Renderer::new(), Canvas::new(), 0, Vec::new())).collect();
+    // The first turn allocates.
+    for turn in 0..=TURNS {
+        for (name, (scene, view), renderer, canvas, fragments, times) in &mut all {
+            match renderer.render_into(scene, view, Resolve::Blend, canvas) {
+                Ok(stats) if turn > 0 => {
+                    *fragments = stats.fragments;
+                    times.push(stats.total_ms);
+                }
+                Ok(_) => {}
+                Err(error) => return println!("{name:<20} {error}"),
+            }
+        }
+    }
+    if !all.is_empty() {
+        println!("\n{:<20} {:>12} {:>9} {:>13}", "scene", "fragments", "median ms", "ns a fragment");
+    }
+    for (name, .., fragments, times) in all {
+        let ms = median(times);
+        println!("{name:<20} {fragments:>12} {ms:>9.2} {:>13.2}", ms * 1e6 / fragments as f64);
+    }
 }

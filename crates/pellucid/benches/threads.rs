@@ -5,12 +5,15 @@
 //! or whose cores slow down together, it is less than the number of threads.
 
 mod common;
+#[path = "common/median.rs"]
+mod median;
 
 use std::hint::black_box;
 use std::thread;
 use std::time::Instant;
 
 use common::SCENES;
+use median::median;
 use pellucid::Resolve;
 use pellucid_cpu::{Canvas, CpuRenderer};
 
@@ -54,11 +57,6 @@ fn main() {
             share * 100.0
         );
     }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// How long the loop takes, on so many threads at once.
