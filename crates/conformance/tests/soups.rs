@@ -7,6 +7,8 @@ use pellucid::core::scene::MaterialTexture;
 use pellucid::core::texture::Sampler;
 use pellucid::{AlphaMode, Camera, Instance, Material, Mesh, Renderer, Resolve, Scene, Technique, Texture, View};
 use pellucid_conformance::{images, layers};
+use pellucid_cpu::CpuRenderer;
+use pellucid_cpu::simd::levels;
 use proptest::prelude::*;
 
 #[path = "common/beside_oracle.rs"]
@@ -155,9 +157,15 @@ fn sheets_over_whole_tiles_equal_the_oracle() {
             scene.add_instance(Instance { mesh: dust_mesh, material, world_from_mesh }).unwrap();
         }
     }
-    for opacity in [1.0, 0.6] {
-        let view = facing(&scene, 96, 64, 4.0).opacity(opacity);
-        assert_equals_oracle(&Renderer::new(), &scene, &view);
+    // Tested surfaces are opaque at opacity 1, and hide what is behind them; else they are layers.
+    for opacity in [1.0, 0.9, 0.6] {
+        let view = facing(&scene, 109, 75, 4.0).opacity(opacity);
+        let capture = assert_equals_oracle(&Renderer::new(), &scene, &view);
+        let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, Resolve::Blend);
+        for (name, level) in levels() {
+            let frame = CpuRenderer::new(0).level(level).render(&scene, &view, Resolve::Blend).unwrap();
+            assert!(expected == frame.image, "{name}");
+        }
     }
 }
 

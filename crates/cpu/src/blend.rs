@@ -5,8 +5,8 @@ use glam::Vec4;
 
 use crate::fragments::COLOR;
 use crate::lit_key;
-use crate::order::{Row, STRIP, Strip, lane_numbers};
-use crate::simd::{columns, each_lane, rows};
+use crate::order::{Row, STRIP, Strip};
+use crate::simd::{columns, each_lane, lane_numbers, rows};
 use crate::tile::{FrameParts, TILE_SAMPLES, TileCapture};
 
 /// Layers blended between two looks at whether anything behind them still counts.

@@ -5,6 +5,7 @@ use fearless_simd::{f32x8, mask32x8, u16x8, u32x8};
 
 use crate::bin::TILE_PX;
 use crate::lit_key;
+use crate::order::STRIP;
 use crate::shade::SHADED_LANES;
 use crate::small_fragments::RunFragments;
 use crate::tile::Band;
@@ -23,8 +24,8 @@ pub(crate) struct Fragments {
     lights: Vec<f32>,
     sources: Vec<u32>,
     primitives: Vec<u32>,
-    /// Where a triangle has a fragment at every sample of a row of the tile: numbers of the first ones, as far as they are noted.
-    /// What is done with each can be done with eight of them at once.
+    /// Where a triangle fills every row of the tile that it reaches, and none of its fragments will be left out: numbers of the first
+    /// ones of the rows. What is done with each can be done with eight of them at once.
     whole_rows: Vec<u32>,
     /// Colours of those that were shaded when they were captured; beyond `color_count` is room.
     colors: Vec<[f32; 4]>,
@@ -193,7 +194,7 @@ impl Fragments {
     /// whole rows.
     #[inline(always)]
     pub(crate) fn eights(&self) -> impl Iterator<Item = usize> {
-        self.whole_rows.iter().flat_map(|&row| (row as usize..row as usize + TILE_PX as usize).step_by(SHADED_LANES))
+        self.whole_rows.iter().flat_map(|&row| (row as usize..row as usize + TILE_PX as usize).step_by(STRIP))
     }
 
     /// Notes that the fragments from a number on fill rows of the tile.
@@ -204,12 +205,6 @@ impl Fragments {
     #[inline(always)]
     pub(crate) fn has_whole_rows(&self) -> bool {
         !self.whole_rows.is_empty()
-    }
-
-    /// Some fragments from a number on are about to be left out, so that others get their numbers.
-    pub(crate) fn forget_whole_rows(&mut self, first: usize) {
-        let kept = self.whole_rows.partition_point(|&row| (row as usize) < first);
-        self.whole_rows.truncate(kept);
     }
 
     /// Leaves out the fragments from a number on.

@@ -18,7 +18,7 @@ use fearless_simd::{f32x8, i32x8, u32x8, u64x8};
 use crate::fragments::Fragments;
 use crate::lit_key;
 use crate::networks::{BLOCK, Bits, Permutation, padded, sort_rows};
-use crate::simd::each_lane;
+use crate::simd::lane_numbers;
 use crate::small_fragments::RunFragments;
 use crate::tile::{Band, FragmentCounts, TILE_SAMPLES};
 
@@ -154,12 +154,6 @@ fn put_each_down(
 #[inline(always)]
 fn of_eight(values: &mut [u32; TILE_SAMPLES], first: u32) -> &mut [u32; STRIP] {
     &mut values.as_chunks_mut().0[first as usize / STRIP % (TILE_SAMPLES / STRIP)]
-}
-
-/// 0 to 7.
-#[inline(always)]
-pub(crate) fn lane_numbers<S: Simd>(simd: S) -> u32x8<S> {
-    u32x8::load_array(simd, each_lane(|lane| lane as u32))
 }
 
 /// Counts the fragments in a band, of a tile that is cut into several if `CUT`.

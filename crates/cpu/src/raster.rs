@@ -46,10 +46,10 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// Whether every row that is covered is covered from end to end.
+    /// Whether every row from the first to the last is covered from end to end.
     #[inline(always)]
     pub(crate) fn has_whole_rows(&self) -> bool {
-        self.rows[self.top] == u32::MAX && self.rows[self.top..=self.bottom].iter().all(|&row| row == u32::MAX)
+        self.rows[self.top..=self.bottom].iter().all(|&row| row == u32::MAX)
     }
 }
 

@@ -16,7 +16,7 @@ use pellucid_core::shading::{GREATEST_COLOR, Varying, slope};
 use crate::bin::TILE_PX;
 use crate::fragments::Fragments;
 use crate::sample::OnTexture;
-use crate::simd::{columns, narrow, rows, widen};
+use crate::simd::{columns, lane_numbers, narrow, rows, widen};
 use crate::tile::TILE_SAMPLES;
 
 /// Fragments shaded at a time.
@@ -130,11 +130,8 @@ impl Unshaded {
 
     #[inline(always)]
     fn shade_simd<S: Simd>(&mut self, simd: S, draw: &Draw<'_>, fragments: &mut Fragments) {
-        let lanes = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
+        let lanes = lane_numbers(simd);
         fragments.make_room_after(LANES);
-        if draw.cutoff.is_some() {
-            fragments.forget_whole_rows(self.first);
-        }
         let is_tested = draw.cutoff.is_some() && self.test_alphas(simd, draw, fragments);
         let end = fragments.end();
         fragments.make_room_for_colors(self.count + LANES);

@@ -94,6 +94,12 @@ pub(crate) fn each_lane<T>(of: impl Fn(usize) -> T) -> [T; 8] {
     [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
 }
 
+/// 0 to 7.
+#[inline(always)]
+pub(crate) fn lane_numbers<S: Simd>(simd: S) -> u32x8<S> {
+    u32x8::load_array(simd, each_lane(|lane| lane as u32))
+}
+
 /// The first and the second numbers of eight pairs.
 #[inline(always)]
 pub(crate) fn unzip<S: Simd, V: SimdBase<S>>(simd: S, pairs: [[V::Element; 2]; 8]) -> [V; 2] {

@@ -397,7 +397,8 @@ impl TileCapture {
             rows.add(simd, y, coverage.rows[y], hidden, [record.draw + 1, primitive], &mut room, &mut count);
         }
         self.fragments.advance(count);
-        if hidden.is_none() && coverage.has_whole_rows() {
+        // Where the alpha test may still leave some out, the others do not keep their numbers.
+        if hidden.is_none() && draw.cutoff.is_none() && coverage.has_whole_rows() {
             self.fragments.note_whole_rows(first);
         }
         if draw.varies() && self.fragments.end() > first {
