@@ -40,9 +40,7 @@ const _: () = assert!(2.0_f32.to_bits() - LEAST_LIGHT < 1 << LIGHT_BITS);
 pub(crate) fn pack<S: Simd>(depth: f32x8<S>, light: f32x8<S>, keys: &mut [u64; LANES]) {
     let light = light.bitcast::<u32x8<S>>() - (LEAST_LIGHT - 1);
     let depth = depth.bitcast::<u32x8<S>>() << (DEPTH_SHIFT - u32::BITS);
-    let [first, second] = in_order([light, depth]);
-    let (low, high) = first.interleave(second);
-    low.combine(high).bitcast::<u64x8<S>>().store_array(keys);
+    store_halves([light, depth], keys);
 }
 
 /// The depths and brightnesses of keys without rank.
@@ -86,9 +84,17 @@ pub(crate) fn halves<S: Simd>(simd: S, keys: &[u64; LANES]) -> [u32x8<S>; 2] {
     in_order(words(u64x8::load_array_ref(simd, keys).bitcast()))
 }
 
+/// Stores keys of these lower and upper halves.
+#[inline(always)]
+pub(crate) fn store_halves<S: Simd>(halves: [u32x8<S>; 2], keys: &mut [u64; LANES]) {
+    let [first, second] = in_order(halves);
+    let (low, high) = first.interleave(second);
+    low.combine(high).bitcast::<u64x8<S>>().store_array(keys);
+}
+
 /// The lower and the upper half of a number as they lie in memory, or the other way round.
 #[inline(always)]
-pub(crate) fn in_order<T>([low, high]: [T; 2]) -> [T; 2] {
+fn in_order<T>([low, high]: [T; 2]) -> [T; 2] {
     if cfg!(target_endian = "little") { [low, high] } else { [high, low] }
 }
 

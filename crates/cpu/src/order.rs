@@ -12,8 +12,7 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdCombine, SimdMask, dispatch};
-use fearless_simd::{f32x8, i32x8, u32x8, u64x8};
+use fearless_simd::{Bytes, Level, Simd, SimdBase, SimdMask, dispatch, f32x8, i32x8, u32x8};
 
 use crate::fragments::Fragments;
 use crate::lit_key;
@@ -123,9 +122,7 @@ fn put_rows_down<S: Simd>(simd: S, fragments: &Fragments, next: &mut [u32; TILE_
             continue;
         }
         let their_depths = f32x8::from_slice(simd, &depths[these.clone()]);
-        let [first, second] = lit_key::in_order([lanes + eight as u32, their_depths.bitcast()]);
-        let (low, high) = first.interleave(second);
-        low.combine(high).bitcast::<u64x8<S>>().store_array(&mut rows[row].0);
+        lit_key::store_halves([lanes + eight as u32, their_depths.bitcast()], &mut rows[row].0);
         (lanes + (places[0] + STRIP as u32)).store_array(places);
         from = these.end;
     }
