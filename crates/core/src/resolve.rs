@@ -51,11 +51,6 @@ impl Resolve {
         ("complexity", "heat map of the number of fragments; complexity:N fixes the scale"),
         ("errors", "blended; in red, pixels that the depth filter of lucid alone leaves out of order"),
     ];
-
-    /// Whether fragments behind an almost opaque front still matter: whether the resolve looks at every layer.
-    pub fn needs_all_layers(self) -> bool {
-        !matches!(self, Self::Blend | Self::Nearest | Self::Errors)
-    }
 }
 
 impl fmt::Display for Resolve {

@@ -17,7 +17,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bin::{PixelRect, TILE_PX, TileGrid};
 use crate::canvas::Canvas;
-use crate::setup::{Chunk, SetupScratch, chunk_spans, chunk_triangles};
+use crate::setup::{Chunk, ChunkSizes, SetupScratch, chunk_spans};
 use crate::tile::{FragmentCounts, FrameParts, TILE_SAMPLES, TileCapture};
 use crate::window::{DEFAULT_BUDGET_BYTES, Windows};
 
@@ -331,7 +331,7 @@ impl<'a> Run<'a> {
         let draws = &*self.draws;
         let scratches = Mutex::new(std::mem::take(&mut memory.scratches));
         let (triangles, threads) = (self.triangles as usize, rayon::current_num_threads());
-        let chunk_triangles = chunk_triangles(triangles, threads, grid.tile_count(), self.budget_bytes);
+        let sizes = ChunkSizes::new(triangles, threads, grid.tile_count(), self.budget_bytes);
         let (budget_bytes, held_bytes) =
             (if is_single_tile { usize::MAX } else { self.budget_bytes }, AtomicUsize::new(0));
         let triangles_done = AtomicUsize::new(0);
@@ -340,18 +340,22 @@ impl<'a> Run<'a> {
         draws.par_iter().for_each(|draw| {
             draw.mesh.meshlets();
         });
-        let spans = chunk_spans(draws, chunk_triangles);
+        let spans = chunk_spans(draws, sizes);
         chunks.resize_with(spans.len(), Chunk::default);
-        chunks.par_iter_mut().zip(&spans).with_max_len(1).for_each(|(chunk, spans)| {
-            if held_bytes.load(Ordering::Relaxed) > budget_bytes {
-                *chunk = Chunk::default();
-                return;
-            }
+        let next = Mutex::new(chunks.iter_mut().zip(&spans));
+        rayon::broadcast(|_| {
             let mut scratch = lock(&scratches).pop().unwrap_or_default();
-            dispatch!(level, simd => chunk.fill(simd, spans, draws, grid, &mut scratch));
+            loop {
+                let Some((chunk, spans)) = lock(&next).next() else { break };
+                if held_bytes.load(Ordering::Relaxed) > budget_bytes {
+                    *chunk = Chunk::default();
+                    continue;
+                }
+                dispatch!(level, simd => chunk.fill(simd, spans, draws, grid, &mut scratch));
+                held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
+                triangles_done.fetch_add(spans.iter().map(|span| span.triangle_count).sum(), Ordering::Relaxed);
+            }
             lock(&scratches).push(scratch);
-            held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
-            triangles_done.fetch_add(spans.iter().map(|span| span.triangle_count).sum(), Ordering::Relaxed);
         });
         self.steps_ms[0] += start.elapsed().as_secs_f64() * 1e3;
         memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -106,25 +106,41 @@ pub(crate) struct Span {
 /// which should not be much of it.
 const BUDGET_FOR_A_TRIANGLE: usize = 512;
 
-/// Triangles in a chunk, unless a meshlet has more: few enough for each thread to get several, so that all end at about the
-/// same time, and for the budget, but so many that tiles find something in each.
-pub(crate) fn chunk_triangles(total: usize, threads: usize, tiles: usize, budget_bytes: usize) -> usize {
-    let most = (budget_bytes / BUDGET_FOR_A_TRIANGLE).clamp(1024, 32_768);
-    // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
-    (total / (threads * 8)).clamp(1024, most.max(2 * tiles))
+/// How many triangles each chunk of a window gets, unless a meshlet has more: the more are left, the more, so that tiles find
+/// something in each chunk, and the last ones few, so that all threads end at about the same time.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ChunkSizes {
+    triangles: usize,
+    threads: usize,
+    least: usize,
+    most: usize,
 }
 
-/// Cuts the triangles of all draws into chunks of about `chunk_triangles`: as many meshlets as reach that number.
-pub(crate) fn chunk_spans(draws: &[Draw<'_>], chunk_triangles: usize) -> Vec<Vec<Span>> {
+impl ChunkSizes {
+    pub(crate) fn new(triangles: usize, threads: usize, tiles: usize, budget_bytes: usize) -> Self {
+        let most = (budget_bytes / BUDGET_FOR_A_TRIANGLE).clamp(1024, 32_768);
+        // Each chunk has tables of all tiles: few bytes for a triangle even where tiles are many.
+        let most = most.max(2 * tiles);
+        Self { triangles, threads, least: (triangles / (threads * 32)).clamp(1024, most), most }
+    }
+
+    /// Triangles of the next chunk where so many are left.
+    fn next(self, left: usize) -> usize {
+        (left / (self.threads * 4)).clamp(self.least, self.most)
+    }
+}
+
+/// Cuts the triangles of all draws into chunks of about those sizes: as many meshlets as reach them.
+pub(crate) fn chunk_spans(draws: &[Draw<'_>], sizes: ChunkSizes) -> Vec<Vec<Span>> {
     let mut chunks: Vec<Vec<Span>> = Vec::new();
-    let mut room = 0;
+    let (mut room, mut left) = (0, sizes.triangles);
     for (draw_number, draw) in draws.iter().enumerate() {
         let meshlets = draw.mesh.meshlets();
         let mut first = 0;
         while first < meshlets.count() {
             if room == 0 {
                 chunks.push(Vec::new());
-                room = chunk_triangles;
+                room = sizes.next(left);
             }
             let (mut end, mut triangle_count) = (first, 0);
             while end < meshlets.count() && triangle_count < room {
@@ -136,6 +152,7 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], chunk_triangles: usize) -> Vec<Vec
             }
             first = end;
             room = room.saturating_sub(triangle_count);
+            left = left.saturating_sub(triangle_count);
         }
     }
     chunks
