@@ -6,6 +6,7 @@ mod common;
 mod flat_view;
 
 use std::cell::RefCell;
+use std::sync::LazyLock;
 
 use glam::{Affine3A, Vec3, Vec4};
 use pellucid::core::oracle;
@@ -20,6 +21,9 @@ use flat_view::flat_view;
 fn techniques() -> impl Iterator<Item = Technique> {
     Technique::ALL.into_iter().filter(|technique| technique.backend() == "gpu" && technique.is_exact())
 }
+
+/// The suite's cases with what the oracle captures of them, which takes seconds.
+static CASES: LazyLock<Vec<(&Case, Prepared)>> = LazyLock::new(|| prepare_all().unwrap());
 
 /// Layered fragment buffers.
 const LFBS: [Technique; 4] = [Technique::Linear, Technique::List, Technique::Pages, Technique::ABuffer];
@@ -62,17 +66,16 @@ fn other_techniques_agree_with_the_oracle() {
 /// With all useful features, and on the portability floor: one after the other, as the driver keeps what it has compiled. All
 /// failures are listed, not the first alone: what fails together tells why.
 fn agree_with_the_oracle(techniques: &[Technique]) {
-    let cases = prepare_all().unwrap();
     let mut failures = Vec::new();
     for floor in [false, true] {
         // One device for all techniques, as most of the time goes into compiling shaders.
         let Some(device) = gpu(floor) else { continue };
         let mut candidate = Candidate::new(Technique::Linear, Renderer::new().gpu(device));
         // For each case what the first LFB made of it.
-        let mut first_made = vec![None; cases.len()];
+        let mut first_made = vec![None; CASES.len()];
         for &technique in techniques {
             candidate = candidate.technique(technique);
-            for ((case, prepared), first_made) in cases.iter().zip(&mut first_made) {
+            for ((case, prepared), first_made) in CASES.iter().zip(&mut first_made) {
                 let witness = Witness { candidate: &candidate, layers: RefCell::default(), images: RefCell::default() };
                 for check in Check::ALL.into_iter().filter(|check| !takes_long(technique, case, *check, floor)) {
                     let comparison = prepared.run(check, &witness).unwrap_or_else(|error| panic!("{case:?}: {error}"));

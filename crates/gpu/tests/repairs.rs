@@ -93,9 +93,9 @@ fn textures_give_the_same_bits_as_buffers() {
 
 #[test]
 fn budgets_far_below_the_guess_are_kept() {
+    let Some(mut whole) = common::renderer(false) else { return };
     for (technique, storage) in SUBJECTS {
-        let Some(whole) = common::renderer(false) else { return };
-        let whole = whole.storage(storage);
+        whole = whole.storage(storage);
         // It has its first guess yet to make, and the tightest budget for it.
         let mut tight = common::renderer(false).unwrap().storage(storage);
         for source in ["@planes:n=12", "@hairball:strands=60"] {

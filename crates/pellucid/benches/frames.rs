@@ -72,8 +72,7 @@ fn measure(case: &Case) {
             Err(error) => return println!("{:<20} {error}", case.name),
         }
     }
-    let mut times: Vec<f64> = all[1..].iter().map(|stats| stats.total_ms).collect();
-    times.sort_by(f64::total_cmp);
+    let times = || all[1..].iter().map(|stats| stats.total_ms);
     let last = &all[all.len() - 1];
     let steps: Vec<String> = last.steps.iter().map(|step| format!("{} {:.1}", step.name, step.ms)).collect();
     let source = case.source();
@@ -83,9 +82,9 @@ fn measure(case: &Case) {
         last.triangles,
         last.fragments,
         last.max_depth_complexity,
-        times[times.len() / 2],
-        times[0],
-        times[times.len() - 1],
+        median(times().collect()),
+        times().fold(f64::INFINITY, f64::min),
+        times().fold(0.0, f64::max),
         last.peak_bytes as f64 / f64::from(1 << 20),
         steps.join(", "),
         if source.starts_with('@') { format!("  ({source})") } else { String::new() }
@@ -94,26 +93,21 @@ fn measure(case: &Case) {
 
 /// Prints what a fragment takes in each case.
 fn measure_in_turns(cases: Vec<Case>) {
-    let mut all: Vec<_> =
-        cases.iter().map(|case| (case.name, case.load(), Renderer::new(), Canvas::new(), 0, Vec::new())).collect();
-    // The first turn allocates.
-    for turn in 0..=TURNS {
-        for (name, (scene, view), renderer, canvas, fragments, times) in &mut all {
-            match renderer.render_into(scene, view, Resolve::Blend, canvas) {
-                Ok(stats) if turn > 0 => {
-                    *fragments = stats.fragments;
-                    times.push(stats.total_ms);
-                }
-                Ok(_) => {}
-                Err(error) => return println!("{name:<20} {error}"),
-            }
-        }
-    }
-    if !all.is_empty() {
+    if !cases.is_empty() {
         println!("\n{:<20} {:>12} {:>9} {:>13}", "scene", "fragments", "median ms", "ns a fragment");
     }
-    for (name, .., fragments, times) in all {
-        let ms = median(times);
+    let mut all: Vec<_> =
+        cases.iter().map(|case| (case.name, case.load(), Renderer::new(), Canvas::new(), Vec::new())).collect();
+    // The first turn allocates.
+    for _ in 0..=TURNS {
+        all.retain_mut(|(name, (scene, view), renderer, canvas, frames)| {
+            let rendered = renderer.render_into(scene, view, Resolve::Blend, canvas);
+            rendered.map(|stats| frames.push(stats)).inspect_err(|error| println!("{name:<20} {error}")).is_ok()
+        });
+    }
+    for (name, .., frames) in all {
+        let fragments = frames[0].fragments;
+        let ms = median(frames[1..].iter().map(|stats| stats.total_ms).collect());
         println!("{name:<20} {fragments:>12} {ms:>9.2} {:>13.2}", ms * 1e6 / fragments as f64);
     }
 }

@@ -6,6 +6,8 @@
 //! draw frames in turns, and before that their unlit pictures must be equal; which tells coverage, not order, as all has one colour.
 
 mod common;
+#[path = "common/median.rs"]
+mod median;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -13,6 +15,7 @@ use std::time::Instant;
 
 use common::{Case, SCENES};
 use glam::Vec4;
+use median::median;
 use pellucid::core::composite::Composite;
 use pellucid::core::fragment::order_key;
 use pellucid::core::pixel_grid::{
@@ -67,10 +70,7 @@ fn measure(case: &Case) {
             (_, Err(error)) => return println!("{:<20} {error}", case.name),
         }
     }
-    let [plain_ms, pellucid_ms] = [plain_ms, pellucid_ms].map(|mut all_ms| {
-        all_ms.sort_by(f64::total_cmp);
-        all_ms[FRAMES / 2]
-    });
+    let [plain_ms, pellucid_ms] = [plain_ms, pellucid_ms].map(median);
     println!(
         "{:<20} {:>10} {fragments:>12} {plain_ms:>9.2} {pellucid_ms:>9.2} {:>9.2}",
         case.name,

@@ -5,6 +5,8 @@
 //! and last come the SIMD levels, in turns: with set-up, as small triangles become fragments there, and from raster alone.
 
 mod common;
+#[path = "common/median.rs"]
+mod median;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -12,6 +14,7 @@ use std::time::Instant;
 use common::{SCENES, case};
 use fearless_simd::{Level, Simd, SimdBase, SimdNarrow, SimdSplit, dispatch, f32x8, f64x8, u32x8};
 use glam::Vec4;
+use median::median;
 use pellucid::{Mesh, Resolve, Scene, Stats, View};
 use pellucid_cpu::{Canvas, CpuRenderer, simd};
 
@@ -38,7 +41,7 @@ fn main() {
     );
     for case in &cases {
         let (scene, view) = case.load();
-        let stats = median(&CpuRenderer::new(0), &scene, &view, 9);
+        let stats = median_frame(&CpuRenderer::new(0), &scene, &view, 9);
         let floors = peaks.floors(&scene, &stats);
         let steps: Vec<String> = stats
             .steps
@@ -104,10 +107,6 @@ fn medians_by_level(scene: &Scene, view: &View, frames: usize) -> Vec<(&'static 
             }
         }
     }
-    let median = |mut all_ms: Vec<f64>| {
-        all_ms.sort_by(f64::total_cmp);
-        all_ms.get(all_ms.len() / 2).copied().unwrap_or(f64::NAN)
-    };
     levels.into_iter().map(|(name, _, all_ms)| (name, all_ms.map(median))).collect()
 }
 
@@ -277,7 +276,7 @@ fn blend<S: Simd>(simd: S, room: &Room) -> f64 {
 }
 
 /// The figures of the median of so many frames, after one that allocates.
-fn median(renderer: &CpuRenderer, scene: &Scene, view: &View, frames: usize) -> Stats {
+fn median_frame(renderer: &CpuRenderer, scene: &Scene, view: &View, frames: usize) -> Stats {
     let mut canvas = Canvas::new();
     let mut all: Vec<Stats> = (0..=frames)
         .filter_map(|_| renderer.render_into(scene, view, Resolve::Blend, &mut canvas).ok())
