@@ -207,11 +207,11 @@ pub fn prepare_all() -> Result<Vec<(&'static Case, Prepared)>, Error> {
 }
 
 impl Case {
-    /// Loads the scene and has the oracle capture it.
+    /// The scene, and the view of it.
     ///
     /// # Errors
     /// None, unless the table of cases is wrong.
-    pub fn prepare(&self) -> Result<Prepared, Error> {
+    pub fn load(&self) -> Result<(Scene, View), Error> {
         let scene = pellucid::load(self.source)?.scene;
         let (width, height) = self.size;
         let background = Vec4::new(0.02, 0.03, 0.05, 1.0);
@@ -223,6 +223,15 @@ impl Case {
             let eye = sphere.center + towards_eye * (sphere.radius * distance);
             view.camera = Camera { eye, target: eye - towards_eye, ..fitted };
         }
+        Ok((scene, view))
+    }
+
+    /// Loads the scene and has the oracle capture it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn prepare(&self) -> Result<Prepared, Error> {
+        let (scene, view) = self.load()?;
         let capture = oracle::capture(&scene, &view)?;
         Ok(Prepared { scene, view, capture })
     }

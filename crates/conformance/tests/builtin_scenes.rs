@@ -7,7 +7,7 @@ use pellucid::core::oracle;
 use pellucid::core::view::direction;
 use pellucid::{Camera, Canvas, Image, Renderer, Resolve, Scene, Technique, View, builtin};
 use pellucid_conformance::layers;
-use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared};
+use pellucid_conformance::suite::{CASES, Candidate, Check, Prepared, prepare_all};
 use pellucid_cpu::{CpuRenderer, simd};
 
 #[path = "common/beside_oracle.rs"]
@@ -33,8 +33,7 @@ fn every_built_in_scene_is_in_the_suite() {
 #[test]
 fn cpu_equals_oracle_in_every_case() {
     let renderer = Renderer::new();
-    for case in CASES {
-        let Prepared { scene, view, capture } = case.prepare().unwrap();
+    for (case, Prepared { scene, view, capture }) in prepare_all().unwrap() {
         let gathered = layers::gather(&renderer, &scene, &view).unwrap();
         if let Some(difference) = layers::first_difference(&capture.layers, &gathered) {
             panic!("{case:?}: {difference}");

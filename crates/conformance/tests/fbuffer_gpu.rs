@@ -30,8 +30,7 @@ fn merged_windows_give_the_same_bits_as_one() {
         (size, Renderer::new().gpu(device).technique(Technique::FBuffer))
     });
     for case in CASES {
-        let prepared = case.prepare().unwrap();
-        let (scene, view) = (&prepared.scene, &prepared.view);
+        let (scene, view) = &case.load().unwrap();
         let expected = whole.render(scene, view, Resolve::Blend).unwrap();
         let expected_layers = layers::gather(&whole, scene, view).unwrap();
         for (size, renderer) in [&tiny, &small, &medium] {

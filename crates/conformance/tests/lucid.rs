@@ -32,7 +32,7 @@ fn filters_of_any_size_give_the_same_bits_and_show_what_they_leave_out_of_order(
     let Some(mut gpu) = gpu(true) else { return };
     let (mut repaired, mut worst) = ([0; 4], 0);
     for case in CASES {
-        let Prepared { scene, view, .. } = case.prepare().unwrap();
+        let (scene, view) = case.load().unwrap();
         gpu = gpu.presort(true);
         let sorted = render(&gpu, &scene, &view, Resolve::Blend);
         gpu = gpu.presort(false);

@@ -116,10 +116,9 @@ fn deep_tiles_of_one_mesh_equal_the_oracle() {
     }
 }
 
-/// Sheets before the whole picture, through each other, of every kind of colour, more of them than are sorted in registers; and
+/// Sheets before the whole picture, through each other, of every kind of colour, so many times one behind another; and
 /// in some places so much dust that neighbours have far more fragments than others.
-#[test]
-fn sheets_over_whole_tiles_equal_the_oracle() {
+fn sheets(copies: usize) -> Scene {
     let mut scene = Scene::new();
     let texels = (0..64u8).map(|i| [i * 4, 200, 255 - i * 3, if i % 5 == 0 { 40 } else { 230 }]).collect();
     let texture = scene.add_texture(Texture::new(8, 8, texels, Sampler::default()).unwrap()).unwrap();
@@ -151,20 +150,32 @@ fn sheets_over_whole_tiles_equal_the_oracle() {
                 ..Material::default()
             })
             .unwrap();
-        scene.add_instance(Instance { mesh, material, world_from_mesh: Affine3A::IDENTITY }).unwrap();
+        for copy in 0..copies {
+            let world_from_mesh = Affine3A::from_translation(Vec3::new(0.0, 0.0, -0.01 * copy as f32));
+            scene.add_instance(Instance { mesh, material, world_from_mesh }).unwrap();
+        }
         if number % 8 == 5 {
             let world_from_mesh = Affine3A::from_scale(Vec3::new(0.2, 0.2, 1.0));
             scene.add_instance(Instance { mesh: dust_mesh, material, world_from_mesh }).unwrap();
         }
     }
-    // Tested surfaces are opaque at opacity 1, and hide what is behind them; else they are layers.
-    for opacity in [1.0, 0.9, 0.6] {
-        let view = facing(&scene, 109, 75, 4.0).opacity(opacity);
+    scene
+}
+
+/// More sheets than are sorted in registers; and so many that tiles are done in bands. Tested surfaces are opaque at opacity
+/// 1, and hide what is behind them; else they are layers.
+#[test]
+fn sheets_over_whole_tiles_equal_the_oracle() {
+    for (copies, [width, height], opacity) in
+        [(1, [109, 75], 1.0), (1, [109, 75], 0.9), (1, [109, 75], 0.6), (16, [53, 37], 0.1)]
+    {
+        let scene = sheets(copies);
+        let view = facing(&scene, width, height, 4.0).opacity(opacity);
         let capture = assert_equals_oracle(&Renderer::new(), &scene, &view);
         let (expected, _) = oracle::resolve_capture(&capture, &scene, &view, Resolve::Blend);
         for (name, level) in levels() {
             let frame = CpuRenderer::new(0).level(level).render(&scene, &view, Resolve::Blend).unwrap();
-            assert!(expected == frame.image, "{name}");
+            assert!(expected == frame.image, "{name}, {copies}, {opacity}");
         }
     }
 }
