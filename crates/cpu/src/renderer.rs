@@ -84,6 +84,9 @@ struct Run<'a> {
     start: Instant,
 }
 
+/// Chunks of triangles are taken in so many turns, in each of them one out of so many.
+const CHUNK_TURNS: usize = 4;
+
 /// The steps of a frame. Those of tiles run side by side: what they took together is shared out. A picture that is not
 /// filled with the background yet is filled during the first. Of tiles that have one colour nothing is left to do in
 /// "raster"; if a pixel has too many fragments for that, it is found out in "order".
@@ -342,20 +345,24 @@ impl<'a> Run<'a> {
         });
         let spans = chunk_spans(draws, sizes);
         chunks.resize_with(spans.len(), Chunk::default);
-        let next = Mutex::new(chunks.iter_mut().zip(&spans));
+        // From all over the scene, so that what exceeds the budget tells what the rest is like.
+        let mut numbered: Vec<_> = chunks.iter_mut().zip(&spans).enumerate().collect();
+        numbered.sort_by_key(|(number, _)| number % CHUNK_TURNS);
+        let next = Mutex::new(numbered.into_iter());
+        let take = || lock(&next).next();
         rayon::broadcast(|_| {
-            let mut scratch = lock(&scratches).pop().unwrap_or_default();
-            loop {
-                let Some((chunk, spans)) = lock(&next).next() else { break };
+            let mut scratch = None;
+            while let Some((_, (chunk, spans))) = take() {
                 if held_bytes.load(Ordering::Relaxed) > budget_bytes {
                     *chunk = Chunk::default();
                     continue;
                 }
-                dispatch!(level, simd => chunk.fill(simd, spans, draws, grid, &mut scratch));
+                let scratch = scratch.get_or_insert_with(|| lock(&scratches).pop().unwrap_or_default());
+                dispatch!(level, simd => chunk.fill(simd, spans, draws, grid, scratch));
                 held_bytes.fetch_add(chunk.bytes(), Ordering::Relaxed);
                 triangles_done.fetch_add(spans.iter().map(|span| span.triangle_count).sum(), Ordering::Relaxed);
             }
-            lock(&scratches).push(scratch);
+            lock(&scratches).extend(scratch);
         });
         self.steps_ms[0] += start.elapsed().as_secs_f64() * 1e3;
         memory.scratches = scratches.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -130,7 +130,7 @@ impl ChunkSizes {
     }
 }
 
-/// Cuts the triangles of all draws into chunks of about those sizes: as many meshlets as reach them.
+/// Cuts the triangles of all draws into chunks of about those sizes: the number of meshlets nearest to them, one at least.
 pub(crate) fn chunk_spans(draws: &[Draw<'_>], sizes: ChunkSizes) -> Vec<Vec<Span>> {
     let mut chunks: Vec<Vec<Span>> = Vec::new();
     let (mut room, mut left) = (0, sizes.triangles);
@@ -142,8 +142,8 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], sizes: ChunkSizes) -> Vec<Vec<Span
                 chunks.push(Vec::new());
                 room = sizes.next(left);
             }
-            let (mut end, mut triangle_count) = (first, 0);
-            while end < meshlets.count() && triangle_count < room {
+            let (mut end, mut triangle_count) = (first + 1, meshlets.triangle_count(first));
+            while end < meshlets.count() && triangle_count + meshlets.triangle_count(end) / 2 < room {
                 triangle_count += meshlets.triangle_count(end);
                 end += 1;
             }
@@ -151,7 +151,7 @@ pub(crate) fn chunk_spans(draws: &[Draw<'_>], sizes: ChunkSizes) -> Vec<Vec<Span
                 chunk.push(Span { draw: draw_number, meshlets: first..end, triangle_count });
             }
             first = end;
-            room = room.saturating_sub(triangle_count);
+            room = if end < meshlets.count() { 0 } else { room.saturating_sub(triangle_count) };
             left = left.saturating_sub(triangle_count);
         }
     }

@@ -82,9 +82,11 @@ fn textures_give_the_same_bits_as_buffers() {
         let Some(buffer) = common::renderer(floor) else { return };
         let texture = common::renderer(floor).unwrap().storage(Storage::Texture);
         for (case, (scene, view)) in &cases {
-            // The same shaders on either device.
-            let resolves = [Resolve::Blend, Resolve::Gelly, Resolve::Nearest, Resolve::Layer(2)];
-            for &resolve in if floor { &resolves[..1] } else { &resolves } {
+            for resolve in [Resolve::Blend, Resolve::Gelly, Resolve::Nearest, Resolve::Layer(2)] {
+                // The same shaders on either device: here it counts whether each is within the limits.
+                if floor && resolve != Resolve::Blend && case.source != "@gallery" {
+                    continue;
+                }
                 let [expected, have] =
                     [&buffer, &texture].map(|gpu| gpu.render(scene, view, resolve, Technique::ABuffer).unwrap().image);
                 assert!(have == expected, "{case:?}, {resolve}, floor: {floor}");
